@@ -1,0 +1,40 @@
+/* What a model must provide to become an FMU. fmi2.c and fmi3.c know nothing else of it.
+ *
+ * A model's memory is plain old data: `Variables` (generated from variables.toml: every parameter, input and output)
+ * followed by its own state. Copying those bytes is copying the FMU state. What is derived from
+ * parameters (tables, the road) hangs off `derived`, is never changed while stepping and can be rebuilt. */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include <stddef.h>
+#include "variables.h" /* generated: typedef struct {...} Variables; counts; start values */
+
+typedef enum { MODEL_OK, MODEL_WARNING, MODEL_ERROR } ModelStatus;
+
+typedef struct Model {
+    Variables v;          /* parameters, inputs and outputs, by the names of variables.toml */
+    void *state;          /* model_state_size bytes of plain old data, owned by the FMI layer */
+    void *derived;        /* owned by the model: model_prepare() builds it, model_release() frees it */
+    const char *resources; /* absolute path of the FMU's resources directory, or "" */
+    void *host;           /* the FMI layer's instance, for model_log() */
+} Model;
+
+extern const size_t model_state_size;
+
+/* Parameters -> derived data; loads the road. Called when initialisation is left, and again when a state of
+ * another parameterisation has been restored. Frees what an earlier call built. */
+ModelStatus model_prepare(Model *m);
+
+/* Initial state (static equilibrium) and the outputs that belong to it. */
+ModelStatus model_initialise(Model *m);
+
+/* Advance from t to t + h with the inputs held; leaves the outputs of t + h in m->v. */
+ModelStatus model_step(Model *m, double t, double h);
+
+void model_release(Model *m);
+
+/* Provided by the FMI layer: `category` is one of the categories declared in variables.toml. printf format. */
+void model_log(const Model *m, ModelStatus status, const char *category, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
+#endif

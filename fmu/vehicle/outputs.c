@@ -1,0 +1,97 @@
+/* What the tool outside sees: CarMaker's names, from the work of the last evaluation. */
+#include "vehicle.h"
+
+static Vec point_acceleration(const Work *w, const State *x, Vec r) {
+    return add(w->acceleration, add(cross(w->angular_acceleration, r), cross(x->rate, cross(x->rate, r))));
+}
+
+void imu_reading(const Vehicle *c, const State *x, const Work *w, double reading[6]) {
+    const Vec force = to_body(c->imu_axes, sub(point_acceleration(w, x, c->imu), w->gravity));
+    const Vec rate = to_body(c->imu_axes, x->rate);
+    reading[0] = force.x, reading[1] = force.y, reading[2] = force.z - 9.81; /* the sensor's constant, not the site's g */
+    reading[3] = rate.x, reading[4] = rate.y, reading[5] = rate.z;
+}
+
+static void body_outputs(Variables *v, const Vehicle *c, const State *x, const Work *w) {
+    const Vec a = point_acceleration(w, x, c->cog), seat = point_acceleration(w, x, c->seat);
+    const Vec velocity = add(x->velocity, cross(x->rate, c->cog));
+    const Vec position = add(x->position, to_inertial(w->R, c->cog));
+    v->Car_ax = a.x, v->Car_ay = a.y, v->Car_az = a.z;
+    v->Car_Seat_ax = seat.x, v->Car_Seat_ay = seat.y, v->Car_Seat_az = seat.z;
+    v->Car_RollVel = x->rate.x, v->Car_PitchVel = x->rate.y, v->Car_YawRate = x->rate.z;
+    v->Car_vx = velocity.x, v->Car_vy = velocity.y, v->Car_vz = velocity.z;
+    v->Car_tx = position.x, v->Car_ty = position.y, v->Car_tz = position.z;
+    v->Car_Roll = atan2(w->R[7], w->R[8]);
+    v->Car_Pitch = asin(clamp(-w->R[6], -1, 1));
+    v->Car_Yaw = atan2(w->R[3], w->R[0]);
+    v->Car_SideSlipAngle = atan2(velocity.y, fmax(fabs(velocity.x), 0.1));
+}
+
+static void corner_outputs(Variables *v, const Vehicle *c, const State *x, const Work *w, int i) {
+    const Corner *k = &w->corner[i];
+    const Tyre *t = &w->tyre[i];
+    const double spin = x->spin[i] - dot(k->rate, k->axle), ratio = v->Damp_MotionRatio[i];
+    v->Car_SteerAngle[i] = k->steer;
+    v->Car_WheelSpd[i] = spin;
+    v->Car_v[i] = v->Wheel_KinematicRadius * spin;
+    v->Car_C_q0[i] = x->travel[i];
+    v->Car_C_q0p[i] = x->travel_rate[i];
+    v->Car_Damp_v[i] = -ratio * x->travel_rate[i];
+    v->Car_Damp_l[i] = -ratio * x->travel[i];
+    v->Car_Damp_Frc[i] = w->damper_force[i] / ratio;
+    v->Car_Damp_Ctrl[i] = x->valve[i];
+    v->Car_PaperRelVel[i] = -x->travel_rate[i] + v->Car_vx * sin(v->Body_PaperTilt);
+    v->Car_Fx[i] = t->Fx, v->Car_Fy[i] = t->Fy, v->Car_Fz[i] = t->Fz;
+    v->Car_LongSlip[i] = t->slip_x;
+    v->Car_SlipAngle[i] = atan(t->slip_y);
+    v->Car_Camber[i] = asin(clamp(w->contact[i].sine_inclination, -1, 1));
+    v->Car_zRoad[i] = w->contact[i].height;
+    v->PT_Motor_Trq[i] = x->motor_torque[i];
+    v->Brake_Trq[i] = x->brake_torque[i];
+    (void)c;
+}
+
+/* Mean of the middle two wheel speeds: neither a locking nor a spinning wheel gets in. */
+static double middle_speed(const double v[CORNERS]) {
+    double low = v[0], high = v[0], sum = 0;
+    for (int i = 0; i < CORNERS; ++i) low = fmin(low, v[i]), high = fmax(high, v[i]), sum += v[i];
+    return (sum - low - high) / 2;
+}
+
+static void sensor_outputs(Variables *v, const Vehicle *c, const State *x, const Work *w) {
+    double reading[6];
+    imu_reading(c, x, w, reading);
+    const double *r = v->Sensor_Imu_Cutoff > 0 ? x->imu : reading;
+    v->Sensor_Imu_ax = r[0], v->Sensor_Imu_ay = r[1], v->Sensor_Imu_az = r[2];
+    v->Sensor_Imu_RollVel = r[3], v->Sensor_Imu_PitchVel = r[4], v->Sensor_Imu_YawRate = r[5];
+    v->Sensor_Esc_vx = middle_speed(v->Car_v);
+}
+
+static void energy_outputs(Variables *v, const Vehicle *c, const State *x, const Work *w) {
+    const double g = v->Env_Gravity;
+    double stored = kinetic_energy(v, c, x, w) + suspension_energy(v, c, x) + c->body_mass * g * x->position.z;
+    for (int i = 0; i < CORNERS; ++i) {
+        const Vec hub = add(x->position, to_inertial(w->R, w->corner[i].r));
+        const double deflection = fmax(w->contact[i].deflection, 0), twist = x->brake_windup[i];
+        stored += c->carrier_mass * g * hub.z + v->Tire_Stiffness * deflection * deflection / 2;
+        stored += v->PT_ShaftStiffness[i] * x->windup[i] * x->windup[i] / 2 + v->Brake_Stiffness * twist * twist / 2;
+    }
+    v->Energy_Stored = stored;
+    v->Energy_Dissipated = x->dissipated;
+    v->Energy_Supplied = x->supplied;
+}
+
+void vehicle_outputs(Variables *v, const Vehicle *c, Memory *m, const Work *w) {
+    const State *x = &m->x;
+    body_outputs(v, c, x, w);
+    for (int i = 0; i < CORNERS; ++i) corner_outputs(v, c, x, w, i);
+    sensor_outputs(v, c, x, w);
+    energy_outputs(v, c, x, w);
+    v->Steer_WhlAng = m->steer;
+    v->Car_Road_sRoad = v->Car_tx, v->Car_Road_tRoad = v->Car_ty;
+    if (c->road) {
+        RoadPosition at;
+        road_locate(c->road, v->Car_tx, v->Car_ty, &m->hint[CORNERS], &at);
+        v->Car_Road_sRoad = at.u, v->Car_Road_tRoad = at.v;
+    }
+}
