@@ -1,0 +1,194 @@
+"""From a scenario to the blocks of one run, connected and ready."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from cosim import loop
+from cosim.comfort import ride_figures
+from cosim.controller import FixedDampers, Skyhook
+from cosim.driver import PathDriver
+from cosim.errors import InputError, NetworkError
+from cosim.fmi import Description, Value
+from cosim.loop import Blocks, ControllerBlock, SensorBlock
+from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, TRUTH, Quantity
+from cosim.recorder import Recorder, Signal
+from cosim.road import BuiltRoad, scenario_road
+from cosim.scenario.schema import Passive, Scenario
+from cosim.scenario.schema import Skyhook as SkyhookSettings
+from cosim.speed_profile import STYLES, speed_profile, travel_time
+from cosim.start import builtin_start, checked_parameters
+from cosim.vehicle import RECORDED, Vehicle, builtin_fmu
+from cosim.wiring import Wiring, mapped_wiring, own_wiring
+from sensor import OUTPUTS, SAMPLE_RATE_HZ, OnnxSensor, SensorError, default_model
+
+STEP_S: Final = 1 / SAMPLE_RATE_HZ
+SETTLING_S: Final = 2.0  # left out of the ride figures: the road's unevenness is still fading in
+LATE: Final = 1.3  # a driver this much slower than his profile has come to grief
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """How a run ended. `comfort` is empty where the vehicle lacks the signals; times in s, deviation in m."""
+
+    steps_done: int
+    wall_time_s: float
+    simulated_s: float
+    lap_time_s: float | None
+    finish_reason: str
+    comfort: Mapping[str, float]
+    largest_deviation_m: float
+
+
+@dataclass
+class Assembly:
+    """The blocks of one run. `files` decide the result: fmu, network, road."""
+
+    recorder: Recorder
+    files: Mapping[str, Path]
+    blocks: Blocks
+    vehicle: Vehicle
+    driver: PathDriver
+    steps: int
+
+    def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
+        """Run to the end of the lap or the last step, and free the FMU whatever happens."""
+        begin = time.perf_counter()
+        try:
+            last = loop.run(self.blocks, self.recorder, self.steps, progress)
+        finally:
+            self.vehicle.close()
+        wall = time.perf_counter() - begin
+        finished = self.driver.finished
+        return RunResult(
+            steps_done=last,
+            wall_time_s=wall,
+            simulated_s=last * STEP_S,
+            lap_time_s=last * STEP_S if finished else None,
+            finish_reason="end of the road" if finished else "duration reached",
+            comfort=_comfort(self.recorder),
+            largest_deviation_m=self.driver.largest_deviation,
+        )
+
+
+def assemble(
+    scenario: Scenario,
+    controller: Passive | SkyhookSettings,
+    sensor: SensorBlock | None = None,
+    dampers: ControllerBlock | None = None,
+) -> Assembly:
+    """Connect the blocks of `scenario` with one of its controllers.
+
+    `sensor` and `dampers` replace the scenario's own (the data set is built so). Raises `InputError`
+    with everything wrong in the scenario, `FmuError` or `NetworkError` for a file that does not load.
+    """
+    wiring, description = _wired(scenario)
+    network = None if sensor is not None else _network(scenario)
+    block = sensor or _sensor(network)
+    road = scenario_road(scenario)
+    style = STYLES[scenario.driver.style]
+    cap = scenario.driver.speed_kmh / 3.6 if scenario.driver.speed_kmh else None
+    speed = speed_profile(road.track, style, cap)
+    start_speed = float(speed[int(np.searchsorted(road.track.s, 0.0))])
+    passive = isinstance(controller, Passive) and dampers is None
+    start = _start_values(scenario, road, start_speed, passive)
+    initial = 0.0 if isinstance(controller, Passive) else controller.initial_command
+    steps = _steps(scenario, travel_time(road.track, speed))
+    driver = PathDriver(road.track, speed, STEP_S)
+    vehicle = Vehicle(description, wiring, start, STEP_S, initial)
+    files = {"fmu": description.path, "network": network, "road": road.file}
+    return Assembly(
+        recorder=Recorder(record_groups(), steps + 1, STEP_S),
+        files={name: path for name, path in files.items() if path is not None},
+        blocks=Blocks(vehicle, driver, block, dampers or _controller(controller)),
+        vehicle=vehicle,
+        driver=driver,
+        steps=steps,
+    )
+
+
+def record_groups() -> list[tuple[str, list[Signal]]]:
+    """Return the groups of the record, in the order of the loop."""
+
+    def signals(quantities: tuple[Quantity, ...]) -> list[Signal]:
+        return [Signal(q.name, q.unit if q.unit != "1" else "", q.description) for q in quantities]
+
+    return [
+        ("channels", signals(CHANNEL_QUANTITIES)),
+        ("estimate", [Signal(o.name, o.unit, o.description) for o in OUTPUTS]),
+        ("valid", [Signal("VRel.Valid", "", "1 where the estimate is valid")]),
+        ("truth", signals(TRUTH)),
+        ("command", signals(DAMPERS)),
+        ("driver", signals(DRIVER)),
+        ("vehicle", signals(RECORDED)),
+    ]
+
+
+def _wired(scenario: Scenario) -> tuple[Wiring, Description]:
+    """Return the vehicle FMU and its wiring, every name in the scenario checked."""
+    settings = scenario.vehicle
+    own = settings.fmu == "builtin"
+    description = Description(
+        builtin_fmu(settings.fmi_version) if own else scenario.resolve(settings.fmu)
+    )
+    wiring, problems = (
+        (own_wiring(), []) if own else mapped_wiring(description, settings.variables, scenario.problem)
+    )
+    problems += checked_parameters(scenario, description)
+    if problems:
+        raise InputError(problems)
+    return wiring, description
+
+
+def _start_values(
+    scenario: Scenario, road: BuiltRoad, speed: float, passive: bool
+) -> dict[str, Value]:
+    settings = scenario.vehicle
+    if settings.fmu != "builtin":
+        return dict(settings.parameters)
+    values = builtin_start(road, speed, passive)
+    if settings.step_s is not None:
+        values["Solver.Step"] = settings.step_s
+    return values | settings.parameters
+
+
+def _network(scenario: Scenario) -> Path:
+    name = scenario.sensor.network
+    return default_model() if name == "default" else scenario.resolve(name)
+
+
+def _sensor(network: Path | None) -> OnnxSensor:
+    try:
+        return OnnxSensor(network or default_model())
+    except SensorError as error:
+        raise NetworkError(str(error)) from None
+
+
+def _controller(settings: Passive | SkyhookSettings) -> ControllerBlock:
+    if isinstance(settings, Passive):
+        return FixedDampers()
+    return Skyhook(
+        settings.feedback == "truth", settings.gain_ns_per_m, settings.initial_command
+    )
+
+
+def _steps(scenario: Scenario, expected_s: float) -> int:
+    if scenario.duration != "lap":
+        return max(round(float(scenario.duration) / STEP_S), 1)
+    return math.ceil(LATE * expected_s / STEP_S)
+
+
+def _comfort(recorder: Recorder) -> dict[str, float]:
+    ride = recorder.group("vehicle")[round(SETTLING_S / STEP_S) :]
+    seat, travel, load = ride[:, 3:6], ride[:, 6:10], ride[:, 10:14]
+    return ride_figures(seat, travel, load, SAMPLE_RATE_HZ)
+
+
+__all__ = ["Assembly", "RunResult", "assemble", "record_groups"]

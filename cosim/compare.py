@@ -1,0 +1,88 @@
+"""From a record to figures: network and baselines against the truth, on the same samples."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.metrics import WHEELS
+from cosim.recorder import Recorder
+from sensor import FirFilter, SensorError, StillWheels, Zero, default_fir, evaluate
+from sensor.estimator import Estimator
+from sensor.metrics import rms
+from sensor.paper import paper_rows
+
+Array = npt.NDArray[np.float64]
+
+
+def compare(recorder: Recorder) -> dict[str, Any]:
+    """Return the figures of every estimator, per wheel and overall, and the rms of the truth.
+
+    `recorder` has the groups channels (rows, 14), estimate (rows, 4) [m/s], valid (rows, 1) and
+    truth (rows, 4) [m/s]. Only rows where the network is valid and every estimate exists count, the
+    same for all. Without such a row there are no figures but `valid_samples`, which is 0.
+    """
+    truth, estimates, rows = estimates_of(recorder)
+    figures: dict[str, Any] = {"valid_samples": int(rows.sum())}
+    if not rows.any():
+        return figures
+    for name, estimate in estimates.items():
+        figures[name] = _figures(estimate, truth, rows)
+    figures["truth"] = _truth(truth[rows])
+    return figures
+
+
+def estimates_of(recorder: Recorder) -> tuple[Array, dict[str, Array], npt.NDArray[np.bool_]]:
+    """Return the truth and each estimator's velocities (rows, 4) [m/s], and the rows that count."""
+    channels, truth = recorder.group("channels"), recorder.group("truth")
+    estimates = {"network": recorder.group("estimate")}
+    rows = recorder.group("valid")[:, 0] > 0
+    if len(channels):
+        estimates |= {name: baseline.apply(channels) for name, baseline in _baselines().items()}
+    for estimate in estimates.values():
+        rows = rows & np.isfinite(estimate).all(axis=1)
+    return truth, estimates, rows
+
+
+def paper_figures(name: str | None) -> dict[str, Any] | None:
+    """Return a row of the paper's Table 4 in the shape of an estimator's figures; None for None."""
+    row = next((row for row in paper_rows() if row.scenario == name), None)
+    if row is None:
+        return None
+    wheels = {wheel: {"rmse_m_s": rmse} for wheel, rmse in zip(WHEELS, row.rmse, strict=True)}
+    overall = {"rmse_m_s": row.rmse_overall, "accuracy_percent": row.accuracy}
+    return {"row": row.scenario, "split": row.split, **wheels, "overall": overall}
+
+
+def _baselines() -> dict[str, Estimator]:
+    """Return the baselines that this installation has; the fitted filter is shipped or is not."""
+    baselines: dict[str, Estimator] = {"body_motion": StillWheels(), "zero": Zero()}
+    with suppress(SensorError):
+        baselines["fir"] = FirFilter.load(default_fir())
+    return baselines
+
+
+def _figures(estimate: Array, truth: Array, rows: npt.NDArray[np.bool_]) -> dict[str, Any]:
+    found = evaluate(estimate, truth, rows)
+    parts = dict(zip(WHEELS, found.wheels, strict=True)) | {"overall": found.overall}
+    return {
+        part: {
+            "rmse_m_s": f.rmse,
+            "nrmse": f.nrmse,
+            "accuracy_percent": f.accuracy,
+            "accuracy_meaningful": f.accuracy_meaningful,
+            "max_abs_error_m_s": f.max_abs_error,
+            "error_low_m_s": f.error_low,
+            "error_high_m_s": f.error_high,
+            "sign_agreement_percent": f.sign_agreement,
+        }
+        for part, f in parts.items()
+    }
+
+
+def _truth(truth: Array) -> dict[str, dict[str, float]]:
+    parts = {wheel: truth[:, [i]] for i, wheel in enumerate(WHEELS)} | {"overall": truth}
+    return {part: {"rms_m_s": rms(values)} for part, values in parts.items()}

@@ -1,0 +1,156 @@
+"""The driver block: follows the track's centre line by preview and a speed profile by pedals.
+
+Lateral: steady-state steer for the previewed curvature plus a correction of the deviation predicted a second
+ahead (single-point preview as in MacAdam, IEEE Trans. SMC 11, 1981). Longitudinal: the profile's own acceleration, the
+slope and the drag as feed-forward, and a proportional-integral correction of the speed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.road import Track
+from cosim.vehicle import State
+
+Array = npt.NDArray[np.float64]
+
+VX: Final = 6  # channel 7, Car.vx
+
+
+@dataclass(frozen=True)
+class DriverModel:
+    """What the driver knows of his car, and how he drives. SI units.
+
+    The understeer gradient and the rear axle's slip gradient are the steady-state figures of the package's
+    vehicle (docs/vehicle.md); another car only costs the feed-forward some accuracy.
+    """
+
+    wheelbase: float = 2.675
+    cog_to_rear: float = 1.236
+    steering_ratio: float = 16.5
+    understeer: float = 0.0036  # rad per m/s2, at the road wheels
+    rear_slip: float = 0.0063  # rad per m/s2
+    mass: float = 2520.0  # with the rotating parts' inertia
+    drive_force: float = 19700.0  # at full accelerator [N]
+    drive_power: float = 267e3  # [W]
+    brake_force: float = 28500.0  # at full pedal [N]
+    drag: float = 0.546  # N per (m/s)^2
+    rolling: float = 240.0  # N
+    preview_time: float = 0.15  # curvature preview: rack and tyre lags [s]
+    correction_time: float = 0.9  # look-ahead of the correction [s]
+    correction_distance: float = 6.0  # its minimum [m]
+    pedal_lag: float = 0.15  # [s]
+    speed_gain: float = 1.0  # 1/s
+    speed_integral: float = 0.15  # 1/s^2
+
+
+class PathDriver:
+    """Drives a car along a track at a given speed profile (n,) [m/s] over `track.s`.
+
+    `step(k, state)` returns the same buffer every time: steering-wheel angle [rad, left positive],
+    accelerator and brake pedal (0..1). `finished` turns true at the end of the lap.
+    """
+
+    def __init__(
+        self, track: Track, speed: Array, step_s: float, model: DriverModel | None = None
+    ) -> None:
+        self.model = model or DriverModel()
+        self.finished = False
+        self.deviation = 0.0  # lateral distance from the centre line, left positive [m]
+        self.largest_deviation = 0.0
+        self.command = np.zeros(3)
+        self._h = step_s
+        self._length = track.length
+        self._first, self._spacing = float(track.s[0]), float(track.s[1] - track.s[0])
+        # Lists: one float at a time is what the loop needs, and a list hands it over fastest.
+        self._x, self._y = track.x.tolist(), track.y.tolist()
+        self._heading, self._curvature = track.heading.tolist(), track.curvature.tolist()
+        self._grade = track.grade.tolist()
+        self._speed = speed.tolist()
+        gain = np.gradient(speed * speed, track.s) / 2
+        self._acceleration = gain.tolist()
+        self._stops = [(s, round(wait / step_s)) for s, wait in track.stops]
+        self._release = -1  # step at which a standing car may leave, -1 while driving
+        self._index = round(-self._first / self._spacing)
+        self._integral = 0.0
+        self._demand = 0.0
+
+    def step(self, k: int, state: State) -> Array:
+        """Return the commands for [t_k, t_k+1]."""
+        x, y, yaw = state.pose.tolist()
+        v = float(state.channels[VX])
+        s = self._locate(x, y)
+        self.finished = s >= self._length
+        self.command[0] = self._steer(v, yaw)
+        self.command[1], self.command[2] = self._pedals(k, s, v)
+        return self.command
+
+    def _locate(self, x: float, y: float) -> float:
+        """Walk to the nearest point of the centre line; return its s and keep the deviation."""
+        i, last = self._index, len(self._x) - 1
+        for _ in range(50):
+            dx, dy = x - self._x[i], y - self._y[i]
+            c, si = math.cos(self._heading[i]), math.sin(self._heading[i])
+            along, across = dx * c + dy * si, dy * c - dx * si
+            move = round(along / self._spacing / max(1 - self._curvature[i] * across, 0.2))
+            if move == 0 or not 0 <= i + move <= last:
+                break
+            i += move
+        self._index = i
+        self.deviation = across
+        self.largest_deviation = max(self.largest_deviation, abs(across))
+        return self._first + i * self._spacing + along
+
+    def _at(self, values: list[float], distance: float) -> float:
+        i = self._index + int(distance / self._spacing + 0.5)
+        return values[i if i < len(values) else -1]
+
+    def _steer(self, v: float, yaw: float) -> float:
+        m = self.model
+        bend = self._at(self._curvature, max(v, 0.0) * m.preview_time)
+        steady = (m.wheelbase + m.understeer * v * v) * bend
+        # A car in a bend points off its course by its side slip: that is no heading error.
+        here = self._curvature[self._index]
+        side_slip = (m.cog_to_rear - m.rear_slip * v * v) * here
+        error = math.remainder(yaw + side_slip - self._heading[self._index], math.tau)
+        ahead = max(m.correction_distance, m.correction_time * v)
+        predicted = self.deviation + ahead * math.sin(error)
+        correction = -2 * (m.wheelbase + m.understeer * v * v) / (ahead * ahead) * predicted
+        return m.steering_ratio * min(max(steady + correction, -0.55), 0.55)
+
+    def _pedals(self, k: int, s: float, v: float) -> tuple[float, float]:
+        if self._stops and self._standing(k, s, v):
+            return 0.0, 0.35
+        m, h = self.model, self._h
+        lead = max(v, 0.0) * m.pedal_lag
+        target = max(self._at(self._speed, lead), 0.7)
+        error = target - v
+        wanted = self._at(self._acceleration, lead) + m.speed_gain * error + self._integral
+        if abs(error) < 2.0:
+            self._integral = min(max(self._integral + m.speed_integral * error * h, -0.5), 0.5)
+        self._demand += (wanted - self._demand) * h / m.pedal_lag
+        slope = 9.81 * self._grade[self._index]
+        force = m.mass * (self._demand + slope) + m.drag * v * v + m.rolling
+        if force >= 0:
+            return min(force / min(m.drive_force, m.drive_power / max(v, 1.0)), 1.0), 0.0
+        return 0.0, min(-force / m.brake_force, 1.0)
+
+    def _standing(self, k: int, s: float, v: float) -> bool:
+        """Stop sections: hold the brake at the line until the wait is over."""
+        line, wait = self._stops[0]
+        if self._release < 0:
+            if s < line - 0.4:
+                return False
+            if v < 0.05:
+                self._release = k + wait
+            return True
+        if k < self._release:
+            return True
+        self._stops.pop(0)
+        self._release, self._integral, self._demand = -1, 0.0, 0.0
+        return False

@@ -1,0 +1,85 @@
+"""Limits of a scenario: their names before the run, their verdicts after it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+from cosim.errors import did_you_mean
+from cosim.metrics import figure, metric_names, with_unit
+
+
+class Bounds(Protocol):
+    """What a limit asks for; `cosim.scenario.schema.Limit` is one."""
+
+    @property
+    def metric(self) -> str:
+        """Dotted path of the figure."""
+
+    @property
+    def min(self) -> float | None:
+        """Smallest value that passes."""
+
+    @property
+    def max(self) -> float | None:
+        """Largest value that passes."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One limit in one run. `value` is None where the run has no such figure, which fails."""
+
+    run: str
+    metric: str
+    value: float | None
+    min: float | None
+    max: float | None
+    passed: bool
+
+    @property
+    def required(self) -> str:
+        """What was asked for, in words."""
+        low = f"at least {with_unit(self.min, self.metric)}" if self.min is not None else ""
+        high = f"at most {with_unit(self.max, self.metric)}" if self.max is not None else ""
+        return " and ".join(words for words in (low, high) if words)
+
+    @property
+    def measured(self) -> str:
+        """What was found, in words."""
+        return "not available" if self.value is None else with_unit(self.value, self.metric)
+
+    def __str__(self) -> str:
+        outcome = "passed" if self.passed else "FAILED"
+        return f"{outcome}: {self.run}: {self.metric} is {self.measured}, required {self.required}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the verdict as it stands in metrics.json."""
+        return asdict(self)
+
+
+def check_metric(metric: str, labels: Sequence[str]) -> str | None:
+    """Return what is wrong with the name of a metric, or None."""
+    names = metric_names(labels)
+    if metric in names:
+        return None
+    hint = did_you_mean(metric, names)
+    return f"'{metric}' is not a metric{hint or ', such as network.overall.accuracy_percent'}"
+
+
+def evaluate(limits: Iterable[Bounds], runs: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
+    """Return one verdict per limit and run, or for one run where the limit begins with its name."""
+    verdicts = []
+    for limit in limits:
+        label, _, rest = limit.metric.partition(".")
+        chosen = {label: rest} if label in runs else dict.fromkeys(runs, limit.metric)
+        for run, path in chosen.items():
+            value = figure(runs[run], path)
+            # A comparison with NaN is false, so a figure that is not a number fails.
+            passed = value is not None and (
+                (limit.min is None or value >= limit.min)
+                and (limit.max is None or value <= limit.max)
+                and value == value
+            )
+            verdicts.append(Verdict(run, path, value, limit.min, limit.max, passed))
+    return verdicts

@@ -1,0 +1,99 @@
+"""The co-simulation loop. Each line is one arrow of the data flow; row k of the record is everything at t_k = k h.
+
+Driver and controller act on sample k and their commands are held over [t_k, t_k+1]: one sample of delay,
+the same for every vehicle FMU.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.recorder import Recorder
+from cosim.vehicle import State
+
+Array = npt.NDArray[np.float64]
+
+PROGRESS_STEPS = 50
+
+
+class VehicleBlock(Protocol):
+    """Steps a car and reads its outputs."""
+
+    def read(self) -> State:
+        """Return the outputs at the present time."""
+
+    def step(self, k: int, driver_command: Array, damper_command: Array) -> None:
+        """Hold both commands over [t_k, t_k+1]."""
+
+    def check_finite(self, k: int) -> None:
+        """Raise `FmuError` if an output that was read is no number."""
+
+
+class DriverBlock(Protocol):
+    """Steers and works the pedals."""
+
+    finished: bool
+
+    def step(self, k: int, state: State) -> Array:
+        """Return steering-wheel angle [rad], accelerator and brake (0..1), (3,)."""
+
+
+class SensorBlock(Protocol):
+    """Estimates the suspension velocities."""
+
+    estimate: Array
+
+    def step(self, measured: Array) -> bool:
+        """Take the 14 channels, update `estimate` (4,) [m/s]; return whether it is valid."""
+
+
+class ControllerBlock(Protocol):
+    """Commands the dampers."""
+
+    def step(self, measured: Array, estimate: Array, valid: bool, truth: Array) -> Array:
+        """Return the damper commands (4,), 0 soft to 1 hard."""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The four roles."""
+
+    vehicle: VehicleBlock
+    driver: DriverBlock
+    sensor: SensorBlock
+    controller: ControllerBlock
+
+
+def run(
+    blocks: Blocks,
+    recorder: Recorder,
+    steps: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Run until the driver has finished, at most `steps` steps; return the number of the last row.
+
+    Whatever raises on the way leaves the rows before it in the recorder.
+    """
+    vehicle, driver, sensor, controller = (
+        blocks.vehicle, blocks.driver, blocks.sensor, blocks.controller,
+    )  # fmt: skip
+    for k in range(steps + 1):
+        state = vehicle.read()  # vehicle -> outputs at t_k
+        vehicle.check_finite(k)
+        valid = sensor.step(state.channels)  # channels -> estimates, or invalid
+        command = controller.step(state.channels, sensor.estimate, valid, state.truth)
+        pedals = driver.step(k, state)
+        recorder.append(
+            k, state.channels, sensor.estimate, valid, state.truth, command, pedals, state.recorded
+        )
+        if progress is not None and k % PROGRESS_STEPS == 0:
+            progress(k, steps)
+        if k == steps or driver.finished:
+            break
+        vehicle.step(k, pedals, command)  # hold both over [t_k, t_k+1]
+    return k

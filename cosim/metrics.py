@@ -1,0 +1,77 @@
+"""Names and units of the figures in metrics.json, known before anything runs.
+
+metrics.json is `{"scenario", "runs": {label: figures}, "limits": [...], "paper": {...} or null}`.
+A limit names a figure by its dotted path within a run, such as `network.overall.accuracy_percent`;
+it is checked in every run, unless it begins with the name of one run:
+`skyhook_estimate.comfort.tyre_load_rms_n`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+WHEELS: Final = ("FL", "FR", "RL", "RR")
+PARTS: Final = (*WHEELS, "overall")
+ESTIMATORS: Final = ("network", "fir", "body_motion", "zero")
+ERROR_FIGURES: Final = (
+    "rmse_m_s",
+    "nrmse",
+    "accuracy_percent",
+    "max_abs_error_m_s",
+    "error_low_m_s",
+    "error_high_m_s",
+    "sign_agreement_percent",
+)
+COMFORT_FIGURES: Final = ("weighted_acceleration_m_s2", "deflection_rms_m", "tyre_load_rms_n")
+RUN_FIGURES: Final = (
+    "lap_time_s",
+    "simulated_s",
+    "wall_time_s",
+    "real_time_factor",
+    "valid_samples",
+)
+
+# Longest endings first: a unit is read off the end of a figure's name.
+UNITS: Final = {
+    "_m_s2": "m/s²",
+    "_m_s": "m/s",
+    "_percent": "%",
+    "_s": "s",
+    "_n": "N",
+    "_m": "m",
+}
+
+
+def unit_of(metric: str) -> str:
+    """Return the unit that the name of a figure ends with, or an empty text."""
+    return next((unit for ending, unit in UNITS.items() if metric.endswith(ending)), "")
+
+
+def with_unit(value: float, metric: str) -> str:
+    """Return a figure to four digits with its unit, as shown to people."""
+    return f"{value:.4g} {unit_of(metric)}".rstrip()
+
+
+def metric_names(labels: Sequence[str] = ()) -> list[str]:
+    """Return every path that a limit may name, with those of the runs in `labels`."""
+    names = [*RUN_FIGURES]
+    names += [f"truth.{part}.rms_m_s" for part in PARTS]
+    names += [
+        f"{estimator}.{part}.{figure}"
+        for estimator in ESTIMATORS
+        for part in PARTS
+        for figure in ERROR_FIGURES
+    ]
+    names += [f"comfort.{figure}" for figure in COMFORT_FIGURES]
+    return names + [f"{label}.{name}" for label in labels for name in names]
+
+
+def figure(figures: Mapping[str, Any], path: str) -> float | None:
+    """Return the figure at a dotted path, or None where the run has none."""
+    here: Any = figures
+    for part in path.split("."):
+        if not isinstance(here, Mapping) or part not in here:
+            return None
+        here = here[part]
+    return float(here) if isinstance(here, int | float) else None

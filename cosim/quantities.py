@@ -1,0 +1,67 @@
+"""What the loop exchanges with a vehicle, by one name each, in SI units.
+
+The names are those of the vehicle FMU that comes with the package. Another FMU takes its place through a
+map from these quantities to its own variables (scenario field `vehicle.variables`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from sensor.channels import CHANNELS, OUTPUTS
+
+CORNERS: Final = ("FL", "FR", "RL", "RR")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity, its SI unit, and where the package's own FMU has it (`scale` times `variable`)."""
+
+    name: str
+    unit: str
+    description: str
+    variable: str
+    scale: float = 1.0
+    required: bool = True
+
+
+def _own(name: str, unit: str, description: str, required: bool = True) -> Quantity:
+    return Quantity(name, unit, description, name, 1.0, required)
+
+
+CHANNEL_QUANTITIES: Final = tuple(_own(c.name, c.unit, c.description) for c in CHANNELS)
+
+TRUTH: Final = tuple(
+    Quantity(
+        f"Truth.{output.name}", "m/s", f"true suspension velocity {corner}, positive in extension",
+        f"Car.C{corner}.q0p", -1.0,
+    )
+    for output, corner in zip(OUTPUTS, CORNERS, strict=True)
+)  # fmt: skip
+
+POSE: Final = (
+    _own("Car.tx", "m", "position of the centre of gravity, inertial x"),
+    _own("Car.ty", "m", "position of the centre of gravity, inertial y"),
+    _own("Car.Yaw", "rad", "yaw angle"),
+)
+
+RIDE: Final = (
+    *(_own(f"Car.Seat.a{axis}", "m/s2", f"acceleration at the seat, {axis}", False) for axis in "xyz"),
+    *(_own(f"Car.C{c}.q0", "m", f"wheel travel {c}, positive in compression", False) for c in CORNERS),
+    *(_own(f"Car.Fz{c}", "N", f"vertical tyre force {c}", False) for c in CORNERS),
+)
+
+STEER: Final = _own("DM.Steer.Ang", "rad", "steering-wheel angle, positive to the left")
+GAS: Final = _own("DM.Gas", "1", "accelerator pedal, 0 to 1")
+BRAKE: Final = _own("DM.Brake", "1", "brake pedal, 0 to 1")
+DRIVER: Final = (STEER, GAS, BRAKE)
+
+DAMPERS: Final = tuple(
+    _own(f"Car.SuspControl.Damper{c}.CtrlOut", "1", f"damper command {c}, 0 soft, 1 hard", False)
+    for c in CORNERS
+)
+
+OUTPUT_QUANTITIES: Final = (*CHANNEL_QUANTITIES, *TRUTH, *POSE, *RIDE)
+INPUT_QUANTITIES: Final = (*DRIVER, *DAMPERS)
+QUANTITIES: Final = {q.name: q for q in (*OUTPUT_QUANTITIES, *INPUT_QUANTITIES)}

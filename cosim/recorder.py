@@ -1,0 +1,151 @@
+"""The record of a run: one row per sample, every value in one array made beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = npt.NDArray[np.float64]
+Format = Literal["csv", "parquet"]
+
+SAMPLE_STEP_S: Final = 0.01  # 100 Hz
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One column: its name, its unit (SI; empty for none) and what it is."""
+
+    name: str
+    unit: str
+    description: str = ""
+
+    @property
+    def header(self) -> str:
+        """Name and unit as they head a column: `Car.ax [m/s2]`."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+TIME: Final = Signal("time", "s", "time, an integer times the sample step")
+
+
+class Recorder:
+    """Keeps what every block said at t_k = k h, k = 0 included.
+
+    `groups` names the columns of each part that `append` is given, in that order. The array is
+    (rows, 1 + signals), time first; rows that were not reached are never shown or written.
+    """
+
+    def __init__(
+        self,
+        groups: Sequence[tuple[str, Sequence[Signal]]],
+        rows: int,
+        step_s: float = SAMPLE_STEP_S,
+    ) -> None:
+        self.signals = (TIME, *(signal for _, signals in groups for signal in signals))
+        names = [signal.name for signal in self.signals]
+        doubled = {name for name in names if names.count(name) > 1}
+        if doubled:
+            raise ValueError(f"signals recorded twice: {', '.join(sorted(doubled))}")
+        self.step_s = step_s
+        self._rows = 0
+        self._data = np.full((rows, len(names)), np.nan)
+        self._slices: dict[str, slice] = {}
+        start = 1
+        for name, signals in groups:
+            self._slices[name] = slice(start, start + len(signals))
+            start += len(signals)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows filled so far."""
+        return self._rows
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the groups, in the order that `append` takes them."""
+        return tuple(self._slices)
+
+    @property
+    def time(self) -> Array:
+        """Time of each row, (rows,) [s]."""
+        return self._data[: self._rows, 0]
+
+    def append(self, k: int, *parts: npt.ArrayLike) -> None:
+        """Copy one part per group into row `k`, which must be the next one."""
+        if k != self._rows:
+            raise ValueError(f"row {k} recorded after {self._rows} rows")
+        if len(parts) != len(self._slices):
+            raise ValueError(f"{len(parts)} parts recorded for {len(self._slices)} groups")
+        row = self._data[k]
+        row[0] = k * self.step_s
+        for columns, part in zip(self._slices.values(), parts, strict=True):
+            row[columns] = part
+        self._rows = k + 1
+
+    def group(self, name: str) -> Array:
+        """Return the filled rows of a group, a view (rows, signals of the group)."""
+        return self._data[: self._rows, self._slices[name]]
+
+    def signals_of(self, name: str) -> tuple[Signal, ...]:
+        """Return the signals of a group."""
+        return self.signals[self._slices[name]]
+
+    def frame(self) -> pd.DataFrame:
+        """Return the filled rows, a column per signal name; `attrs["units"]` maps name to unit."""
+        import pandas as pd
+
+        names = [signal.name for signal in self.signals]
+        frame = pd.DataFrame(self._data[: self._rows].copy(), columns=names)
+        frame.attrs["units"] = {signal.name: signal.unit for signal in self.signals}
+        return frame
+
+    def write(self, directory: Path, file_format: Format = "csv") -> Path:
+        """Write the filled rows to `signals.csv` or `signals.parquet` and return the file.
+
+        CSV carries each number with the fewest digits that read back to the same bits; Parquet
+        carries unit and description with each column. Raises `InputError` where pyarrow is missing.
+        """
+        directory.mkdir(parents=True, exist_ok=True)
+        path = directory / f"signals.{file_format}"
+        write = self._write_csv if file_format == "csv" else self._write_parquet
+        write(path)
+        return path
+
+    def _write_csv(self, path: Path) -> None:
+        with path.open("w", encoding="utf-8", newline="\n") as stream:
+            stream.write(",".join(signal.header for signal in self.signals) + "\n")
+            for row in self._data[: self._rows]:
+                stream.write(",".join(map(repr, row.tolist())) + "\n")
+
+    def _write_parquet(self, path: Path) -> None:
+        require_parquet()
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        fields = [
+            pa.field(s.name, pa.float64(), False, {"unit": s.unit, "description": s.description})
+            for s in self.signals
+        ]
+        columns = [pa.array(column) for column in self._data[: self._rows].T]
+        pq.write_table(pa.Table.from_arrays(columns, schema=pa.schema(fields)), path)
+
+
+def require_parquet() -> None:
+    """Raise `InputError` with what to do where Parquet cannot be written."""
+    import importlib.util
+
+    if importlib.util.find_spec("pyarrow") is None:
+        raise InputError(
+            "output.format: parquet needs pyarrow; "
+            "pip install 'suspension-cosim[parquet]', or choose csv"
+        )

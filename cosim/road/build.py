@@ -1,0 +1,57 @@
+"""A road file for a track and a surface, built once and kept in a cache."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+from cosim.road.crg import WRITER_VERSION, write_crg
+from cosim.road.errors import RoadError
+from cosim.road.surface import Surface, surface_key
+from cosim.road.track import Track
+
+
+def default_cache_dir() -> Path:
+    """Return the directory named by COSIM_CACHE_DIR, or ~/.cache/suspension-cosim."""
+    named = os.environ.get("COSIM_CACHE_DIR")
+    return Path(named) if named else Path.home() / ".cache" / "suspension-cosim"
+
+
+def build_road(track: Track, surface: Surface, cache_dir: Path | None = None) -> Path:
+    """Return the OpenCRG file of `track` with `surface`, from `cache_dir` if it was built before.
+
+    The file's name carries a hash of all that it is made from, and it appears whole or not at all, so any
+    number of processes may build the same road. Raises `RoadError` if the cache cannot be written.
+    """
+    directory = default_cache_dir() if cache_dir is None else cache_dir
+    path = directory / f"{track.name}-{surface.label}-{_key(track, surface)[:16]}.crg"
+    if path.is_file():
+        return path
+    v = surface.columns(track.s)
+    grid = surface.elevation(track.s, v)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=directory, prefix=".", suffix=".crg")
+        os.close(handle)
+        try:
+            write_crg(Path(name), track, v, grid)
+            Path(name).replace(path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise RoadError(
+            f"the road cannot be kept in {directory} ({error.strerror}); "
+            "set COSIM_CACHE_DIR to a directory that can be written"
+        ) from error
+    return path
+
+
+def _key(track: Track, surface: Surface) -> str:
+    digest = hashlib.sha256(f"{WRITER_VERSION} {track.name} {track.length!r}".encode())
+    for line in (track.s, *track.lines()):
+        digest.update(line.tobytes())
+    digest.update(surface_key(surface).encode())
+    return digest.hexdigest()

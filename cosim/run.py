@@ -1,0 +1,275 @@
+"""`execute`: one scenario from its settings to its results, once per controller.
+
+The results of a run are the signals, metrics.json, scenario.resolved.yaml, versions.json and
+report.html. Whatever was recorded before a failure is written before the failure is passed on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from cosim.errors import InputError, NetworkError
+from cosim.limits import Verdict, evaluate
+from cosim.recorder import Recorder, require_parquet
+from cosim.scenario.schema import Passive, Scenario, Skyhook
+
+Progress = Callable[[str, int, int], None]
+
+RESULT_FILES: Final = (
+    "signals.csv",
+    "signals.parquet",
+    "metrics.json",
+    "scenario.resolved.yaml",
+    "versions.json",
+    "report.html",
+)
+
+
+class RunResult(Protocol):
+    """How one run ended."""
+
+    @property
+    def steps_done(self) -> int:
+        """Number of sample steps taken."""
+
+    @property
+    def wall_time_s(self) -> float:
+        """Time that the loop took [s]."""
+
+    @property
+    def simulated_s(self) -> float:
+        """Simulated time [s]."""
+
+    @property
+    def lap_time_s(self) -> float | None:
+        """Time at the end of the road [s], None when it was not reached."""
+
+    @property
+    def finish_reason(self) -> str:
+        """Why the run ended, in a few words."""
+
+    @property
+    def comfort(self) -> Mapping[str, Any]:
+        """Figures by name, at least those of `cosim.metrics.COMFORT_FIGURES`."""
+
+
+class Assembly(Protocol):
+    """The blocks of one run, connected and ready."""
+
+    @property
+    def recorder(self) -> Recorder:
+        """The record that the run fills."""
+
+    @property
+    def files(self) -> Mapping[str, Path]:
+        """Files that decide the result, such as `fmu`, `network` and `road`, to be hashed."""
+
+    def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
+        """Run to the end; `progress` is told steps done and steps at most."""
+
+
+Assemble = Callable[[Scenario, "Passive | Skyhook"], Assembly]
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """One run: the name of its controller, the record and the figures of metrics.json."""
+
+    label: str
+    recorder: Recorder
+    figures: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What `execute` leaves: the runs, the verdicts and where everything was written."""
+
+    scenario: Scenario
+    output_dir: Path
+    runs: tuple[RunOutcome, ...]
+    verdicts: tuple[Verdict, ...]
+    metrics: dict[str, Any]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every limit holds."""
+        return all(verdict.passed for verdict in self.verdicts)
+
+    @property
+    def exit_code(self) -> int:
+        """0 when every limit holds, else 1."""
+        return 0 if self.passed else 1
+
+
+def execute(
+    scenario: Scenario,
+    output_dir: Path,
+    progress: Progress | None = None,
+    assemble: Assemble | None = None,
+    command: str = "",
+) -> Outcome:
+    """Run the scenario once per controller, write the results and return them.
+
+    `command` is the command line that the report shows; `assemble` connects the blocks of a run
+    (default: `cosim.assembly.assemble`). Raises `InputError` for what a user can mend, `FmuError`
+    or `NetworkError` for a block that fails; rows recorded until then are written first.
+    """
+    from cosim.provenance import provenance
+
+    if scenario.output.format == "parquet":
+        require_parquet()
+    assemble = assemble or _assemble()
+    _prepare(output_dir, scenario)
+    runs: list[RunOutcome] = []
+    versions: dict[str, Any] = {}
+    for controller in scenario.controllers:
+        with _network_errors():
+            assembly = assemble(scenario, controller)
+        if not versions:
+            versions = provenance({"scenario": scenario.file, **assembly.files}, command)
+            _write_json(output_dir / "versions.json", versions)
+        folder = output_dir if len(scenario.controllers) == 1 else output_dir / controller.label
+        runs.append(_run(scenario, controller, assembly, folder, progress))
+    outcome = _judge(scenario, output_dir, tuple(runs))
+    return _report(outcome, versions)
+
+
+@contextmanager
+def _network_errors() -> Iterator[None]:
+    """Turn the sensor's own exception into one of this package's."""
+    from sensor import SensorError
+
+    try:
+        yield
+    except SensorError as error:
+        raise NetworkError(str(error)) from error
+
+
+def _assemble() -> Assemble:
+    from cosim.assembly import assemble
+
+    return assemble
+
+
+def _prepare(output_dir: Path, scenario: Scenario) -> None:
+    """Make the folder, and take away what an earlier run left there."""
+    folders = [output_dir, *(output_dir / item.label for item in scenario.controllers)]
+    try:
+        output_dir.mkdir(parents=True, exist_ok=True)
+        for folder in folders:
+            for name in RESULT_FILES:
+                (folder / name).unlink(missing_ok=True)
+        (output_dir / "scenario.resolved.yaml").write_text(
+            resolved_yaml(scenario), encoding="utf-8"
+        )
+    except OSError as error:
+        raise InputError(f"cannot write to '{output_dir}': {error.strerror or error}") from None
+
+
+def _run(
+    scenario: Scenario,
+    controller: Passive | Skyhook,
+    assembly: Assembly,
+    folder: Path,
+    progress: Progress | None,
+) -> RunOutcome:
+    from cosim.compare import compare
+
+    label = controller.label
+
+    def tell(done: int, total: int) -> None:
+        if progress is not None:
+            progress(label, done, total)
+
+    try:
+        with _network_errors():
+            result = assembly.run(tell)
+    finally:
+        # Also after an error: the rows before it are what shows its cause.
+        if assembly.recorder.rows:
+            assembly.recorder.write(folder, scenario.output.format)
+    figures = {
+        "controller": controller.model_dump(mode="json", exclude_none=True),
+        "finish_reason": result.finish_reason,
+        "lap_time_s": result.lap_time_s,
+        "simulated_s": result.simulated_s,
+        "wall_time_s": result.wall_time_s,
+        "real_time_factor": result.simulated_s / max(result.wall_time_s, 1e-9),
+        **compare(assembly.recorder),
+        "comfort": dict(result.comfort),
+    }
+    return RunOutcome(label, assembly.recorder, figures)
+
+
+def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -> Outcome:
+    from cosim.compare import paper_figures
+
+    figures = {run.label: run.figures for run in runs}
+    verdicts = tuple(evaluate(scenario.limits, figures))
+    metrics = finite(
+        {
+            "scenario": scenario.name,
+            "runs": figures,
+            "limits": [asdict(verdict) for verdict in verdicts],
+            "paper": paper_figures(scenario.paper_row),
+        }
+    )
+    _write_json(output_dir / "metrics.json", metrics)
+    return Outcome(scenario, output_dir, runs, verdicts, metrics)
+
+
+def _report(outcome: Outcome, versions: Mapping[str, Any]) -> Outcome:
+    from dataclasses import replace
+
+    from cosim.report import ReportError, write_report
+
+    try:
+        write_report(outcome, versions, outcome.output_dir / "report.html")
+    except ReportError as missing:
+        return replace(outcome, notes=(*outcome.notes, str(missing)))
+    return outcome
+
+
+def finite(value: Any) -> Any:
+    """Return `value` with every number that JSON cannot carry (NaN, infinities) as None."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value
+
+
+def resolved_yaml(scenario: Scenario) -> str:
+    """Return the scenario with every default and override filled in and absolute paths, as YAML."""
+    import io
+
+    from ruamel.yaml import YAML
+
+    data = scenario.model_dump(mode="json", by_alias=True, exclude_none=True)
+    if scenario.road.file is not None:
+        data["road"] = {"file": str(scenario.resolve(scenario.road.file).resolve())}
+    if scenario.vehicle.fmu != "builtin":
+        data["vehicle"]["fmu"] = str(scenario.resolve(scenario.vehicle.fmu).resolve())
+        del data["vehicle"]["fmi_version"]
+    if scenario.sensor.network != "default":
+        data["sensor"]["network"] = str(scenario.resolve(scenario.sensor.network).resolve())
+    yaml = YAML()
+    yaml.width = 100
+    stream = io.StringIO()
+    yaml.dump(data, stream)
+    return stream.getvalue()
+
+
+def _write_json(path: Path, value: Any) -> None:
+    path.write_text(
+        json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n", "utf-8"
+    )

@@ -1,0 +1,1 @@
+"""Scenario files: what may stand in them (`schema`) and how they are read (`load`)."""

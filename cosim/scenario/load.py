@@ -1,0 +1,114 @@
+"""Reading a scenario: file, overrides, validation and cross-checks, with every problem at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from cosim.errors import InputError, Place, Problem, did_you_mean
+from cosim.limits import check_metric
+from cosim.scenario.messages import problems_of
+from cosim.scenario.overrides import apply_override
+from cosim.scenario.schema import Scenario
+from cosim.scenario.source import Key, Source, read
+from sensor.paper import paper_rows
+
+# Fields that name a file, the word that needs none, and the ending that the file must have.
+FILE_FIELDS: Final[tuple[tuple[Key, str | None, str, str], ...]] = (
+    (("road", "file"), None, ".crg", "an OpenCRG road"),
+    (("vehicle", "fmu"), "builtin", ".fmu", "an FMU"),
+    (("sensor", "network"), "default", ".onnx", "an ONNX network"),
+)
+
+
+def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Return the scenario in `path` with overrides such as `driver.style=normal` laid over it.
+
+    An override is applied before anything is checked. Raises `InputError` with every problem found.
+    """
+    return load_labelled(path, [(text, f"--set {text}") for text in overrides])
+
+
+def load_labelled(path: str | Path, overrides: Sequence[tuple[str, str]]) -> Scenario:
+    """Like `load`, each override with the text that a message shall name it by."""
+    data, source, problems = read(Path(path))
+    for text, label in overrides:
+        problem = apply_override(data, source, text, label)
+        if problem is not None:
+            problems.append(Problem(problem, Place(label)))
+    problems += _file_problems(data, source) + _name_problems(data, source)
+    try:
+        scenario = Scenario.model_validate(data)
+    except ValidationError as error:
+        problems += problems_of(error, data, source)
+    if problems:
+        raise InputError(sorted(problems, key=_order))
+    scenario._source = source
+    return scenario
+
+
+def _order(problem: Problem) -> tuple[int, int]:
+    """Sort by line and column, with problems of the command line last."""
+    if problem.place is None or not problem.place.line:
+        return (2**31, 0)
+    return (problem.place.line, problem.place.column)
+
+
+def _value(data: Any, key: Key) -> Any:
+    for part in key:
+        if not isinstance(data, dict) or part not in data:
+            return None
+        data = data[part]
+    return data
+
+
+def _file_problems(data: dict[str, Any], source: Source) -> list[Problem]:
+    """Check on the raw values, so that a wrong field elsewhere does not hide a missing file."""
+    problems = []
+    for key, word, ending, what in FILE_FIELDS:
+        value = _value(data, key)
+        if not isinstance(value, str) or not value or value == word:
+            continue
+        file = source.folder / value
+        place = source.locate(key)
+        name = ".".join(str(part) for part in key)
+        if file.suffix.lower() != ending:
+            instead = f"'{word}' or " if word else ""
+            message = f"{name} must be {instead}{what} ({ending}), not '{value}'"
+            problems.append(Problem(message + did_you_mean(value, [word] if word else []), place))
+        elif not file.is_file():
+            beside = file.parent.glob(f"*{ending}") if file.parent.is_dir() else ()
+            hint = did_you_mean(file.name, [other.name for other in beside])
+            problems.append(Problem(f"{name}: there is no file '{file}'{hint}", place))
+    return problems
+
+
+def _name_problems(data: dict[str, Any], source: Source) -> list[Problem]:
+    """Check the names that are known before the run: metrics and the paper's rows."""
+    problems = []
+    limits = data.get("limits")
+    for index, limit in enumerate(limits if isinstance(limits, list) else ()):
+        metric = limit.get("metric") if isinstance(limit, dict) else None
+        message = check_metric(metric, _labels(data)) if isinstance(metric, str) else None
+        if message:
+            problems.append(Problem(message, source.locate(("limits", index, "metric"))))
+    row, rows = data.get("paper_row"), [printed.scenario for printed in paper_rows()]
+    if isinstance(row, str) and row not in rows:
+        message = f"'{row}' is not a row of the paper's Table 4{did_you_mean(row, rows)}"
+        problems.append(Problem(message, source.locate(("paper_row",))))
+    return problems
+
+
+def _labels(data: dict[str, Any]) -> list[str]:
+    """Names of the runs, as far as the raw values tell."""
+    controllers = data.get("controllers")
+    labels = []
+    for item in controllers if isinstance(controllers, list) else ({"kind": "passive"},):
+        if isinstance(item, dict):
+            kind, feedback = item.get("kind"), item.get("feedback", "estimate")
+            default = "passive" if kind == "passive" else f"{kind}_{feedback}"
+            labels.append(str(item.get("name") or default))
+    return labels

@@ -1,0 +1,69 @@
+"""How fast a driver goes where: the g-g limit of a style over a track.
+
+Quasi-steady lap simulation by a forward and a backward pass (Brayshaw & Harrison, Proc. IMechE D 219, 2005): the
+curvature caps the speed, and what the lateral acceleration leaves of the g-g ellipse accelerates and brakes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.road import Track
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Style:
+    """Acceleration limits of a driver [m/s2]: speeding up, braking (positive), cornering."""
+
+    accelerate: float
+    brake: float
+    corner: float
+
+
+STYLES: Final = {
+    "aggressive": Style(4.0, 6.0, 5.0),
+    "normal": Style(3.0, 4.0, 4.0),
+    "defensive": Style(2.0, 2.0, 3.0),
+}
+
+
+def speed_profile(track: Track, style: Style, cap: float | None = None) -> Array:
+    """Return the speed [m/s] at each point of `track.s` (n,); zero at the stops.
+
+    `cap` [m/s] lowers the track's own speed limits. The run-out after the lap is driven on, not braked for.
+    """
+    curvature = np.abs(track.curvature)
+    speed = np.sqrt(style.corner / np.maximum(curvature, 1e-6))
+    speed = np.minimum(speed, track.speed_limit)
+    if cap is not None:
+        speed = np.minimum(speed, cap)
+    for stop in track.stops:
+        speed[np.searchsorted(track.s, stop[0])] = 0.0
+    step = float(track.s[1] - track.s[0])
+    forward = _limited(speed, curvature, step, style.accelerate, style.corner)
+    return _limited(forward[::-1], curvature[::-1], step, style.brake, style.corner)[::-1]
+
+
+def _limited(speed: Array, curvature: Array, step: float, along: float, across: float) -> Array:
+    """One pass in the direction of the array: v dv/ds within the ellipse of `along` and `across`."""
+    squares = (speed * speed).tolist()
+    for i, bend in enumerate(curvature[:-1].tolist()):
+        used = min(squares[i] * bend / across, 1.0)
+        reachable = squares[i] + 2 * step * along * (1 - used * used) ** 0.5
+        if reachable < squares[i + 1]:
+            squares[i + 1] = reachable
+    return np.sqrt(np.array(squares))
+
+
+def travel_time(track: Track, speed: Array) -> float:
+    """Return the time [s] that the profile takes from s = 0 to the end of the lap, stops included."""
+    lap = (track.s >= 0) & (track.s <= track.length)
+    slowness = 1 / np.maximum(speed[lap], 0.7)
+    waits = sum(stop[1] for stop in track.stops)
+    return float(np.trapezoid(slowness, track.s[lap])) + waits

@@ -1,0 +1,69 @@
+"""Start values of the vehicle FMU: where it stands, on which road, with which parameters."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from cosim.errors import Problem
+from cosim.fmi import Description, Value
+from cosim.road import BuiltRoad
+from cosim.scenario.schema import Scenario
+
+# Set from the scenario's other fields; a second setting under parameters would contradict them.
+_TAKEN: Final = {
+    "Road.File": "road", "Init.x": "road", "Init.y": "road", "Init.Yaw": "road",
+    "Init.Velocity": "driver.speed_kmh", "Solver.Step": "vehicle.step_s",
+    "Damp.Passive": "controllers",
+}  # fmt: skip
+
+
+def builtin_start(road: BuiltRoad, speed: float, passive: bool) -> dict[str, Value]:
+    """Return the start values that put the package's own vehicle at s = 0 of the road, rolling at `speed` [m/s]."""
+    pose = road.track.pose(0.0)
+    values: dict[str, Value] = {
+        "Init.x": pose.x,
+        "Init.y": pose.y,
+        "Init.Yaw": pose.heading,
+        "Init.Velocity": speed,
+        "Damp.Passive": passive,
+    }
+    if road.file is not None:
+        values["Road.File"] = str(road.file)
+    return values
+
+
+def checked_parameters(scenario: Scenario, description: Description) -> list[Problem]:
+    """Return what is wrong with `vehicle.parameters`: names, types, ranges, and settings made elsewhere."""
+    own = scenario.vehicle.fmu == "builtin"
+    parameters = {
+        name: v for name, v in description.variables.items() if v.causality in ("parameter", "input")
+    }
+    problems = []
+    for name, value in scenario.vehicle.parameters.items():
+        key = ("vehicle", "parameters", name)
+        variable = parameters.get(name)
+        if variable is None:
+            sentence = f"'{description.path.name}' has no parameter '{name}'"
+            problems.append(scenario.problem(key, sentence, tuple(parameters), name))
+        elif own and name in _TAKEN:
+            problems.append(scenario.problem(key, f"'{name}' is set by {_TAKEN[name]}; use that"))
+        elif (sentence := _unfit(variable, value, description.unit_of(name))) is not None:
+            problems.append(scenario.problem(key, f"{name} {sentence}"))
+    return problems
+
+
+def _unfit(variable: object, value: Value, unit: str | None) -> str | None:
+    """Say why a value does not fit a variable, or None."""
+    kind = getattr(variable, "type")  # noqa: B009 - FMPy's variables have no types for mypy
+    wants = {"Boolean": (bool, "true or false"), "String": (str, "text")}.get(kind)
+    if wants is not None:
+        return None if isinstance(value, wants[0]) else f"= {value!r} must be {wants[1]}"
+    if isinstance(value, bool | str):
+        return f"= {value!r} must be a number"
+    low, high = getattr(variable, "min", None), getattr(variable, "max", None)
+    shown = f" {unit}" if unit and unit != "1" else ""
+    if low is not None and value < float(low):
+        return f"= {value:g}{shown} is below its least value {float(low):g}{shown}"
+    if high is not None and value > float(high):
+        return f"= {value:g}{shown} is above its greatest value {float(high):g}{shown}"
+    return None

@@ -1,0 +1,120 @@
+"""The tables that people read, as text cells: the same ones on the terminal and in the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from cosim.limits import Verdict
+from cosim.metrics import COMFORT_FIGURES, ESTIMATORS, PARTS, figure, unit_of
+from sensor.metrics import LEAST_TRUTH_RMS
+
+NAMES: Final = {
+    "network": "Network",
+    "fir": "Linear FIR",
+    "body_motion": "Body motion only",
+    "zero": "Zero",
+}
+COMFORT_NAMES: Final = {
+    "weighted_acceleration_m_s2": "ISO 2631-1 weighted acceleration",
+    "deflection_rms_m": "Suspension deflection rms",
+    "tyre_load_rms_n": "Dynamic tyre load rms",
+}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text below a title; the first column names the row, the others are figures."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Return a figure with so many decimals, or a dash for none."""
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def estimate_table(figures: Mapping[str, Any], paper: Mapping[str, Any] | None = None) -> Table:
+    """Return the errors of network and baselines at each wheel, and the paper's row if any."""
+    columns = (
+        "estimate",
+        *(f"{part} [m/s]" for part in PARTS),
+        "accuracy [%]",
+        "95 % of errors [m/s]",
+        "max |error| [m/s]",
+    )
+    rows = []
+    for estimator in ESTIMATORS:
+        rmse = [figure(figures, f"{estimator}.{part}.rmse_m_s") for part in PARTS]
+        if all(value is None for value in rmse):
+            continue
+        accuracy = figure(figures, f"{estimator}.overall.accuracy_percent")
+        largest = figure(figures, f"{estimator}.overall.max_abs_error_m_s")
+        band = [figure(figures, f"{estimator}.overall.error_{end}_m_s") for end in ("low", "high")]
+        between = f"{band[0]:+.4f} … {band[1]:+.4f}" if None not in band else "-"
+        cells = (*map(number, rmse), number(accuracy, 1), between, number(largest))
+        rows.append((NAMES[estimator], *cells))
+    if paper:
+        rmse = [figure(paper, f"{part}.rmse_m_s") for part in PARTS]
+        accuracy = figure(paper, "overall.accuracy_percent")
+        cells = (*map(number, rmse), number(accuracy, 1), "-", "-")
+        rows.append(("Paper's network", *cells))
+    truth = [figure(figures, f"truth.{part}.rms_m_s") for part in PARTS]
+    rows.append(("Truth, rms", *map(number, truth), "", "", ""))
+    quiet = truth[-1] is not None and truth[-1] < LEAST_TRUTH_RMS
+    note = f"The truth is below {LEAST_TRUTH_RMS} m/s rms: only the RMSE counts." if quiet else ""
+    return Table("RMSE of the estimate at each wheel", columns, tuple(rows), note)
+
+
+def comparison_table(runs: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Return comfort, deflection and tyre load of each run beside its estimate.
+
+    Percentages are changes against the first run.
+    """
+    columns = (
+        "run",
+        *(f"{COMFORT_NAMES[name]} [{unit_of(name)}]" for name in COMFORT_FIGURES),
+        "estimate RMSE [m/s]",
+        "estimate accuracy [%]",
+    )
+    first = next(iter(runs.values()))
+    rows = []
+    for label, figures in runs.items():
+        comfort = [_against(first, figures, f"comfort.{name}") for name in COMFORT_FIGURES]
+        rmse = figure(figures, "network.overall.rmse_m_s")
+        accuracy = figure(figures, "network.overall.accuracy_percent")
+        rows.append((label, *comfort, number(rmse), number(accuracy, 1)))
+    return Table("Controllers compared", columns, tuple(rows))
+
+
+def verdict_table(verdicts: Sequence[Verdict]) -> Table:
+    """Return one row per limit and run."""
+    rows = tuple(
+        (v.metric, v.run, v.measured, v.required, "passed" if v.passed else "FAILED")
+        for v in verdicts
+    )
+    return Table("Limits", ("metric", "run", "measured", "required", "verdict"), rows)
+
+
+def _against(first: Mapping[str, Any], figures: Mapping[str, Any], path: str) -> str:
+    value, base = figure(figures, path), figure(first, path)
+    if value is None:
+        return "-"
+    change = f" ({100 * (value / base - 1):+.1f} %)" if base and first is not figures else ""
+    return f"{value:.3g}{change}"
+
+
+def plain(table: Table) -> str:
+    """Return the table as lines of text, numbers to the right."""
+    lines = [table.columns, *table.rows]
+    widths = [max(len(row[i]) for row in lines) for i in range(len(table.columns))]
+    text = [table.title]
+    for first, *figures in lines:
+        cells = [first.ljust(widths[0])]
+        cells += [cell.rjust(width) for cell, width in zip(figures, widths[1:], strict=True)]
+        text.append("  " + "  ".join(cells).rstrip())
+    return "\n".join([*text, table.note] if table.note else text)
