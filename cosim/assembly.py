@@ -20,7 +20,7 @@ from cosim.fmi import Description, Value
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, TRUTH, Quantity
 from cosim.recorder import Recorder, Signal
-from cosim.road import BuiltRoad, scenario_road
+from cosim.course import Course, course_of
 from cosim.scenario.schema import Passive, Scenario
 from cosim.scenario.schema import Skyhook as SkyhookSettings
 from cosim.speed_profile import STYLES, speed_profile, travel_time
@@ -92,18 +92,18 @@ def assemble(
     wiring, description = _wired(scenario)
     network = None if sensor is not None else _network(scenario)
     block = sensor or _sensor(network)
-    road = scenario_road(scenario)
+    course = course_of(scenario)
     style = STYLES[scenario.driver.style]
     cap = scenario.driver.speed_kmh / 3.6 if scenario.driver.speed_kmh else None
-    speed = speed_profile(road.track, style, cap)
-    start_speed = float(speed[int(np.searchsorted(road.track.s, 0.0))])
+    speed = speed_profile(course.track, style, cap)
+    start_speed = float(speed[int(np.searchsorted(course.track.s, 0.0))])
     passive = isinstance(controller, Passive) and dampers is None
-    start = _start_values(scenario, road, start_speed, passive)
+    start = _start_values(scenario, course, start_speed, passive)
     initial = 0.0 if isinstance(controller, Passive) else controller.initial_command
-    steps = _steps(scenario, travel_time(road.track, speed))
-    driver = PathDriver(road.track, speed, STEP_S)
+    steps = _steps(scenario, travel_time(course.track, speed))
+    driver = PathDriver(course.track, speed, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, initial)
-    files = {"fmu": description.path, "network": network, "road": road.file}
+    files = {"fmu": description.path, "network": network, "road": course.file}
     return Assembly(
         recorder=Recorder(record_groups(), steps + 1, STEP_S),
         files={name: path for name, path in files.items() if path is not None},
@@ -148,12 +148,12 @@ def _wired(scenario: Scenario) -> tuple[Wiring, Description]:
 
 
 def _start_values(
-    scenario: Scenario, road: BuiltRoad, speed: float, passive: bool
+    scenario: Scenario, course: Course, speed: float, passive: bool
 ) -> dict[str, Value]:
     settings = scenario.vehicle
     if settings.fmu != "builtin":
         return dict(settings.parameters)
-    values = builtin_start(road, speed, passive)
+    values = builtin_start(course, speed, passive)
     if settings.step_s is not None:
         values["Solver.Step"] = settings.step_s
     return values | settings.parameters

@@ -164,7 +164,7 @@ def _show_rich(table: Table) -> None:
     shown = RichTable(title=table.title, title_justify="left", box=box.SIMPLE_HEAD)
     shown.caption = table.note or None
     for index, column in enumerate(table.columns):
-        shown.add_column(column, justify="right" if index else "left")
+        shown.add_column(Text(column), justify="right" if index else "left")
     styles: dict[str, str] = {"passed": "green", "FAILED": "bold red"}
     for row in table.rows:
         shown.add_row(*(Text(cell, style=styles.get(cell, "")) for cell in row))

@@ -47,6 +47,7 @@ class DriverModel:
     pedal_lag: float = 0.15  # [s]
     speed_gain: float = 1.0  # 1/s
     speed_integral: float = 0.15  # 1/s^2
+    creep_speed: float = 0.7  # up to a stop line [m/s]
 
 
 class PathDriver:
@@ -77,6 +78,7 @@ class PathDriver:
         self._stops = [(s, round(wait / step_s)) for s, wait in track.stops]
         self._release = -1  # step at which a standing car may leave, -1 while driving
         self._index = round(-self._first / self._spacing)
+        self._earliest = 0  # of the profile: behind a stop that is over, its braking counts no more
         self._integral = 0.0
         self._demand = 0.0
 
@@ -107,7 +109,7 @@ class PathDriver:
         return self._first + i * self._spacing + along
 
     def _at(self, values: list[float], distance: float) -> float:
-        i = self._index + int(distance / self._spacing + 0.5)
+        i = max(self._index, self._earliest) + int(distance / self._spacing + 0.5)
         return values[i if i < len(values) else -1]
 
     def _steer(self, v: float, yaw: float) -> float:
@@ -128,9 +130,11 @@ class PathDriver:
             return 0.0, 0.35
         m, h = self.model, self._h
         lead = max(v, 0.0) * m.pedal_lag
-        target = max(self._at(self._speed, lead), 0.7)
+        target, feed = self._at(self._speed, lead), self._at(self._acceleration, lead)
+        if target < m.creep_speed:  # near a stop line: roll up to it, and away from it
+            target, feed = m.creep_speed, 0.0
         error = target - v
-        wanted = self._at(self._acceleration, lead) + m.speed_gain * error + self._integral
+        wanted = feed + m.speed_gain * error + self._integral
         if abs(error) < 2.0:
             self._integral = min(max(self._integral + m.speed_integral * error * h, -0.5), 0.5)
         self._demand += (wanted - self._demand) * h / m.pedal_lag
@@ -144,7 +148,7 @@ class PathDriver:
         """Stop sections: hold the brake at the line until the wait is over."""
         line, wait = self._stops[0]
         if self._release < 0:
-            if s < line - 0.4:
+            if s < line - 0.4 and not (v < 0.3 and s > line - 2.0):
                 return False
             if v < 0.05:
                 self._release = k + wait
@@ -152,5 +156,6 @@ class PathDriver:
         if k < self._release:
             return True
         self._stops.pop(0)
+        self._earliest = int((line + 0.5 - self._first) / self._spacing)
         self._release, self._integral, self._demand = -1, 0.0, 0.0
         return False

@@ -13,9 +13,16 @@ from typing import ClassVar
 
 
 def nearest(name: str, choices: Iterable[str]) -> str | None:
-    """Return the choice most like `name` whatever its case, or None when none is close."""
+    """Return the choice most like `name` whatever its case, or None when none is close.
+
+    A choice that `name` is the beginning of counts as nearest, the shortest first.
+    """
     by_folded = {choice.casefold(): choice for choice in choices}
-    matches = difflib.get_close_matches(name.casefold(), by_folded, n=1, cutoff=0.6)
+    wanted = name.casefold()
+    longer = [folded for folded in by_folded if len(wanted) > 2 and folded.startswith(wanted)]
+    if longer:
+        return by_folded[min(longer, key=len)]
+    matches = difflib.get_close_matches(wanted, by_folded, n=1, cutoff=0.6)
     return by_folded[matches[0]] if matches else None
 
 

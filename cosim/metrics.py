@@ -29,6 +29,7 @@ RUN_FIGURES: Final = (
     "simulated_s",
     "wall_time_s",
     "real_time_factor",
+    "largest_deviation_m",
     "valid_samples",
 )
 

@@ -55,6 +55,10 @@ class RunResult(Protocol):
         """Why the run ended, in a few words."""
 
     @property
+    def largest_deviation_m(self) -> float:
+        """Largest distance from the road's reference line [m]."""
+
+    @property
     def comfort(self) -> Mapping[str, Any]:
         """Figures by name, at least those of `cosim.metrics.COMFORT_FIGURES`."""
 
@@ -195,12 +199,14 @@ def _run(
         # Also after an error: the rows before it are what shows its cause.
         if assembly.recorder.rows:
             assembly.recorder.write(folder, scenario.output.format)
+    tell(result.steps_done, result.steps_done)
     figures = {
         "controller": controller.model_dump(mode="json", exclude_none=True),
         "finish_reason": result.finish_reason,
         "lap_time_s": result.lap_time_s,
         "simulated_s": result.simulated_s,
         "wall_time_s": result.wall_time_s,
+        "largest_deviation_m": result.largest_deviation_m,
         "real_time_factor": result.simulated_s / max(result.wall_time_s, 1e-9),
         **compare(assembly.recorder),
         "comfort": dict(result.comfort),

@@ -6,7 +6,7 @@ from typing import Final
 
 from cosim.errors import Problem
 from cosim.fmi import Description, Value
-from cosim.road import BuiltRoad
+from cosim.course import Course
 from cosim.scenario.schema import Scenario
 
 # Set from the scenario's other fields; a second setting under parameters would contradict them.
@@ -17,19 +17,17 @@ _TAKEN: Final = {
 }  # fmt: skip
 
 
-def builtin_start(road: BuiltRoad, speed: float, passive: bool) -> dict[str, Value]:
+def builtin_start(course: Course, speed: float, passive: bool) -> dict[str, Value]:
     """Return the start values that put the package's own vehicle at s = 0 of the road, rolling at `speed` [m/s]."""
-    pose = road.track.pose(0.0)
-    values: dict[str, Value] = {
+    pose = course.track.pose(0.0)
+    return {
         "Init.x": pose.x,
         "Init.y": pose.y,
         "Init.Yaw": pose.heading,
         "Init.Velocity": speed,
         "Damp.Passive": passive,
+        "Road.File": str(course.file),
     }
-    if road.file is not None:
-        values["Road.File"] = str(road.file)
-    return values
 
 
 def checked_parameters(scenario: Scenario, description: Description) -> list[Problem]:

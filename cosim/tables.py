@@ -42,10 +42,10 @@ def estimate_table(figures: Mapping[str, Any], paper: Mapping[str, Any] | None =
     """Return the errors of network and baselines at each wheel, and the paper's row if any."""
     columns = (
         "estimate",
-        *(f"{part} [m/s]" for part in PARTS),
+        *PARTS,
         "accuracy [%]",
         "95 % of errors [m/s]",
-        "max |error| [m/s]",
+        "max [m/s]",
     )
     rows = []
     for estimator in ESTIMATORS:
@@ -67,7 +67,7 @@ def estimate_table(figures: Mapping[str, Any], paper: Mapping[str, Any] | None =
     rows.append(("Truth, rms", *map(number, truth), "", "", ""))
     quiet = truth[-1] is not None and truth[-1] < LEAST_TRUTH_RMS
     note = f"The truth is below {LEAST_TRUTH_RMS} m/s rms: only the RMSE counts." if quiet else ""
-    return Table("RMSE of the estimate at each wheel", columns, tuple(rows), note)
+    return Table("RMSE of the estimate at each wheel [m/s]", columns, tuple(rows), note)
 
 
 def comparison_table(runs: Mapping[str, Mapping[str, Any]]) -> Table:

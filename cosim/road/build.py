@@ -22,8 +22,9 @@ def default_cache_dir() -> Path:
 def build_road(track: Track, surface: Surface, cache_dir: Path | None = None) -> Path:
     """Return the OpenCRG file of `track` with `surface`, from `cache_dir` if it was built before.
 
-    The file's name carries a hash of all that it is made from, and it appears whole or not at all, so any
-    number of processes may build the same road. Raises `RoadError` if the cache cannot be written.
+    The file's name carries a hash of all that it is made from, and it appears whole or not at all,
+    so any number of processes may build the same road. Raises `RoadError` if the cache cannot be
+    written.
     """
     directory = default_cache_dir() if cache_dir is None else cache_dir
     path = directory / f"{track.name}-{surface.label}-{_key(track, surface)[:16]}.crg"

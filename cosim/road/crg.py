@@ -17,16 +17,20 @@ WRITER_VERSION = 1  # part of the cache's key: count up when the files change
 _BLOCK = 80  # binary data is filled up to whole blocks of so many bytes
 
 
-def write_crg(path: Path, track: Track, v: npt.NDArray[np.float64], grid: npt.NDArray[np.float32]) -> None:
+def write_crg(
+    path: Path, track: Track, v: npt.NDArray[np.float64], grid: npt.NDArray[np.float32]
+) -> None:
     """Write a track with the elevation `grid` [m], shape (len(track.s), len(v)), over columns `v` [m].
 
-    u of the file is s of the track; x, y and z stay the track's own (an empty $ROAD_CRG_MODS keeps readers from moving
-    the start to the origin). Heading and slope are those of the chords from one cross section to the next.
+    u of the file is s of the track; x, y and z stay the track's own (an empty $ROAD_CRG_MODS keeps
+    readers from moving the start to the origin). Heading and slope are those of the chords from one
+    cross section to the next.
     """
     dx, dy, dz = np.diff(track.x), np.diff(track.y), np.diff(track.z)
     chord = np.arctan2(dy, dx)
     middle = 0.5 * (track.heading[1:] + track.heading[:-1])
-    phi = middle + np.remainder(chord - middle + np.pi, 2.0 * np.pi) - np.pi  # on the track's own turn
+    # the chord's direction, counted on as the track counts its heading
+    phi = middle + np.remainder(chord - middle + np.pi, 2.0 * np.pi) - np.pi
     first = [float(track.heading[0])]  # the first entries of both channels are not used
     data = np.column_stack(
         [np.concatenate((first, phi)), np.concatenate(([0.0], dz / DS)), track.banking, grid]

@@ -79,9 +79,9 @@ def _parse_word(word: str) -> Element:
 def curvature_profile(elements: Sequence[Element], transition: float) -> PPoly:
     """Return curvature over s from 0 to the layout's length, linear piece by piece [1/m over m].
 
-    Each change of curvature becomes a clothoid of length `transition` [m], or shorter where an element
-    leaves no room, centred on the place of the change: the integral over it stays the same, so every
-    heading change and the length of the road are those of the layout.
+    Each change of curvature becomes a clothoid of length `transition` [m], or shorter where an
+    element leaves no room, centred on the place of the change: the integral over it stays the same,
+    so every heading change and the length of the road are those of the layout.
     """
     knots, values = [0.0], [elements[0].curvature]
     end = 0.0
@@ -120,7 +120,7 @@ def gauss_points(s: Floats) -> Floats:
 def close_circuit(
     elements: Sequence[Element], transition: float, adjustable: tuple[int, int]
 ) -> tuple[Element, ...]:
-    """Return the elements with the two straights at `adjustable` changed so that the end meets the start.
+    """Return the elements, the two straights at `adjustable` changed so that the end meets the start.
 
     Raises `RoadError` if the arcs do not turn by a whole circle, or a straight would vanish.
     """
@@ -133,7 +133,7 @@ def close_circuit(
         for index, change in zip(adjustable, np.linalg.solve(directions, -gap), strict=True):
             element = closed[index]
             if not isinstance(element, Straight) or element.length + change < 1.0:
-                raise RoadError(f"element {index + 1} cannot close the circuit; name another straight")
+                raise RoadError(f"element {index + 1} cannot close the circuit; name another")
             closed[index] = replace(element, length=element.length + float(change))
     return tuple(closed)
 

@@ -1,8 +1,8 @@
 """Unevenness of the road surface: none, random after ISO 8608, or bumps.
 
-A surface gives elevations relative to the reference line on a grid of cross sections (the track's s)
-and columns (v, positive to the left), in m. All are frozen and fully described by their fields, which is what the
-road cache's key is made of.
+A surface gives elevations relative to the reference line on a grid of cross sections (the
+track's s) and columns (v, positive to the left), in m. All are frozen and fully described by
+their fields, which is what the key of the road cache is made of.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cosim.road.errors import RoadError
 Floats = npt.NDArray[np.float64]
 
 HALF_WIDTH = 4.5  # of every road [m]
-_TRACKS = np.concatenate(([-4.5, -3.2, -2.2, -1.6], np.linspace(-1.25, -0.45, 9)))
+_TRACKS = np.concatenate(([-4.5, -3.2, -2.2, -1.6], np.linspace(-1.2, -0.4, 9)))  # wheels +-.35 m
 _WHEEL_COLUMNS = np.round(np.concatenate((_TRACKS, [0.0], -_TRACKS[::-1])), 3)
 _DENSE_COLUMNS = np.round(np.linspace(-HALF_WIDTH, HALF_WIDTH, 91), 3)
 _MOST_CELLS = 2_400_000  # of a grid that is dense over its whole width (10 MB)
@@ -29,10 +29,11 @@ REFERENCE_FREQUENCY = 0.1  # n0 [cycles/m]
 LOWEST_FREQUENCY = 0.011  # ISO 8608's range, before the tyre's patch filters it [cycles/m]
 HIGHEST_FREQUENCY = 10.0
 ROUGHNESS = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}  # Gd(n0), geometric mean [m3]
-# Coherence between tracks T apart: gamma = [1 + (2 pi n T / Wp)^w]^-p with w = 2; (Wp, p) by class
+# Between lines T apart: gamma = [1 + (2 pi n T / Wp)^w]^-p with w = 2; (Wp, p) by class
 _COHERENCE = {"A": (8.5, 3.5), "B": (5.3, 2.2), "C": (3.0, 1.3), "D": (1.6, 0.8)}
 
-_FADE_START, _FADE_END = 3.0, 13.0  # the road is even to the start and fully rough from the end on [m]
+# The road is even up to the first and fully rough from the second on [m]
+_FADE_START, _FADE_END = 3.0, 13.0
 _QUANTUM = 2.0**-20  # elevations are multiples of it [m]: the same on every machine
 _FREQUENCIES_AT_ONCE = 4096
 
@@ -71,8 +72,9 @@ class Iso8608:
     """One Gaussian field over (s, v) with the spectrum of an ISO 8608 class, A to D.
 
     Along s its displacement spectrum is Gd(n) = Gd(n0) (n / n0)^-2 between 0.011 and 10 cycles/m;
-    across, two lines T apart have the coherence of `coherence`, frequency by frequency. Front and rear wheels
-    thus meet the same road, and what a wheel meets hardly depends on where between the columns it runs.
+    across, two lines T apart have the coherence of `coherence`, frequency by frequency. Front and
+    rear wheels thus meet the same road, and what a wheel meets hardly depends on where between the
+    columns it runs.
     """
 
     road_class: str
@@ -81,7 +83,7 @@ class Iso8608:
     def __post_init__(self) -> None:
         if self.road_class not in ROUGHNESS:
             hint = did_you_mean(self.road_class, ROUGHNESS)
-            raise RoadError(f"road class '{self.road_class}' is not known; choose A, B, C or D{hint}")
+            raise RoadError(f"road class '{self.road_class}' is not one of A, B, C, D{hint}")
         if self.seed < 0:
             raise RoadError(f"the surface's seed is {self.seed}; it must not be negative")
 
@@ -91,7 +93,7 @@ class Iso8608:
         return f"iso8608-{self.road_class.lower()}-{self.seed}"
 
     def columns(self, s: Floats) -> Floats:
-        """Return columns 0.1 m apart [m]: over the whole width if the road is short, else where wheels run."""
+        """Return columns 0.1 m apart [m], on a long road only where the wheels run."""
         return _DENSE_COLUMNS if len(s) * len(_DENSE_COLUMNS) <= _MOST_CELLS else _WHEEL_COLUMNS
 
     def elevation(self, s: Floats, v: Floats) -> npt.NDArray[np.float32]:
@@ -104,7 +106,7 @@ class Iso8608:
         for first in range(0, len(used), _FREQUENCIES_AT_ONCE):
             rows = used[first : first + _FREQUENCIES_AT_ONCE]
             spectrum[rows] = self._amplitudes(random, frequency[rows], v, ds)
-        # one bin holds Gd dn; irfft divides by the count
+        # a bin holds Gd dn; irfft divides by the count
         spectrum *= count * np.sqrt(0.25 / (count * ds))
         field = np.fft.irfft(spectrum, count, axis=0)[: len(s)] * _fade_in(s)[:, None]
         return np.asarray(np.round(field / _QUANTUM) * _QUANTUM, dtype=np.float32)
@@ -120,10 +122,11 @@ class Iso8608:
     ) -> npt.NDArray[np.complex128]:
         """Return complex amplitudes of variance 2 Gd, shape (len(frequency), len(v)).
 
-        The Cholesky factor of the coherences between all columns mixes independent amplitudes. Wheels
-        run between the grid's points, where linear interpolation takes away from the short
-        waves: on average over a cell 1/3 + (2/3 and 1/3 of) the coherence of its corners is left. The
-        amplitudes are raised by as much, so that the class is met on average over the wheel's places.
+        The Cholesky factor of the coherences between all columns mixes independent amplitudes.
+        Wheels run between the grid's points, where linear interpolation takes away from the short
+        waves: averaged over the places between two points of coherence g, the power (1 - f)^2 + f^2
+        + 2 f (1 - f) g leaves 2/3 + g/3. The amplitudes are raised by as much, so that a wheel
+        meets the class on average.
         """
         n = frequency[:, None, None]
         coherence = self.coherence(n, np.abs(v[:, None] - v))
@@ -141,8 +144,8 @@ class Iso8608:
 class Bumps:
     """Cosine bumps across one side of the road, left and right in turn.
 
-    `height` and `length` [m] are those of a bump; `spacing` [m] is from one bump to the next on the same side,
-    and the right-hand bumps stand half of it behind the left-hand ones.
+    `height` and `length` [m] are those of a bump; `spacing` [m] is from one bump to the next on the
+    same side, and the right-hand bumps stand half of it behind the left-hand ones.
     """
 
     height: float
@@ -150,16 +153,13 @@ class Bumps:
     spacing: float
 
     _first: ClassVar[float] = 15.0  # start of the first bump [m]
-    _inner: ClassVar[float] = 0.3  # a bump reaches to this distance from the middle [m] and fades out to it
+    _inner: ClassVar[float] = 0.3  # nearer to the middle a bump falls off to nothing [m]
 
-    def __post_init__(self) -> None:
-        for name in ("height", "length", "spacing"):
-            if not getattr(self, name) > 0.0:
-                raise RoadError(f"the bumps' {name} is {getattr(self, name):g} m; it must be positive")
-        if self.spacing < self.length:
-            raise RoadError(
-                f"the bumps' spacing of {self.spacing:g} m is less than their length of {self.length:g} m"
-            )
+                def __post_init__(self) -> None: for name in ("height", "length", "spacing"): if not
+                getattr(self, name) > 0.0: value = getattr(self, name) raise RoadError(f"the bumps'
+                {name} is {value:g} m; it must be positive") if self.spacing < self.length: raise
+                RoadError( f"the bumps' spacing of {self.spacing:g} m is less than their length of
+                {self.length:g} m" )
 
     @property
     def label(self) -> str:

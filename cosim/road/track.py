@@ -30,7 +30,7 @@ class Stop(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """The reference line at one place: x, y, z [m], heading [rad], curvature [1/m], grade and banking [-]."""
+    """The reference line at one place, in the units of `Track`."""
 
     x: float
     y: float
@@ -45,10 +45,10 @@ class Pose(NamedTuple):
 class Track:
     """The reference line on a uniform grid of s, from the lead-in (s < 0) to the run-out (s > length).
 
-    All arrays have shape (n,). x, y, z in m (ISO 8855: z up), `heading` in rad counter-clockwise and
-    continuous, `curvature` in 1/m positive to the left, `grade` = dz/ds, `banking` the cross slope,
-    positive when the left side is higher (as in OpenCRG). `speed_limit` in m/s. A closed circuit's lead-in
-    and run-out lie on its own end and start.
+    All arrays have shape (n,). x, y, z in m (ISO 8855: z up), `heading` in rad counter-clockwise
+    and continuous, `curvature` in 1/m positive to the left, `grade` = dz/ds, `banking` the cross
+    slope, positive when the left side is higher (as in OpenCRG). `speed_limit` in m/s. The lead-in
+    and the run-out of a closed circuit lie on its own end and start.
     """
 
     name: str
@@ -86,10 +86,11 @@ class Track:
         return float(self.speed_limit[i])
 
     def nearest(self, x: float, y: float, near: float | None = None) -> tuple[float, float]:
-        """Return s [m] of the point nearest to (x, y) and the offset from it, positive to the left [m].
+        """Return s [m] of the point nearest to (x, y) and the offset to the left of it [m].
 
-        With `near`, the s of the last answer, only its surroundings are searched, which keeps the lap where a
-        circuit overlaps its own start; without it the first of equally near places counts.
+        With `near`, the s of the last answer, only its surroundings are searched, which keeps the
+        lap where a circuit overlaps its own start; without it the first of equally near places
+        counts.
         """
         first, last = 0, len(self.s)
         if near is not None:
@@ -120,9 +121,9 @@ def _descend(track: Track, i: int, last: int, x: float, y: float) -> int:
 class Layout:
     """What a track is built from.
 
-    `grade` and `banking` are (s [m], value [-]) pairs, joined by smooth steps without a kink; before the first and
-    behind the last the value stays. `limits` are (from s [m], km/h) pairs. `transition` is the clothoids'
-    length [m], `heading` the direction at s = 0 [rad].
+    `grade` and `banking` are (s [m], value [-]) pairs, joined by smooth steps without a kink;
+    before the first and behind the last the value stays. `limits` are (from s [m], km/h) pairs.
+    `transition` is the clothoids' length [m], `heading` the direction at s = 0 [rad].
     """
 
     name: str
@@ -139,7 +140,8 @@ class Layout:
 def build_track(layout: Layout) -> Track:
     """Return the track of a layout, its line integrated to round-off from the curvature's clothoids."""
     length = sum(e.length for e in layout.elements)
-    s = -LEAD_IN + DS * np.arange(math.ceil((LEAD_IN + length + RUN_OUT) / DS) + 1)
+    count = math.ceil((LEAD_IN + length + RUN_OUT) / DS) + 1
+    s: Floats = np.asarray(-LEAD_IN + DS * np.arange(count), dtype=np.float64)
     curvature, heading = _bends(layout, length)
     start = round(LEAD_IN / DS)
     x, y = follow(heading(gauss_points(s)), DS)
@@ -200,8 +202,10 @@ def _bends(
     return bend, heading
 
 
-def _integral(grade: Callable[[Floats], Floats], s: Floats, layout: Layout, length: float) -> Floats:
-    """Return z of the line [m], 0 at s = 0: Simpson over each step, which is exact for a cubic grade."""
+def _integral(
+    grade: Callable[[Floats], Floats], s: Floats, layout: Layout, length: float
+) -> Floats:
+    """Return z of the line [m], 0 at s = 0: Simpson's rule, which is exact for a cubic grade."""
 
     def wrapped(q: Floats) -> Floats:
         return grade(_wrapped(q, length) if layout.closed else q)

@@ -1,7 +1,7 @@
 """The tracks: where they come from, and `load_track` to have one by name.
 
-Hockenheim follows the arc list of the short circuit as simulators carry it; Heilbronn and the rural road
-have no public layout and are made up to the known length, speeds and features, from fixed seeds.
+Hockenheim follows the arc list of the short circuit as CarMaker carries it; Heilbronn and the rural
+road have no public layout and are made up to the known length, speeds and features.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ _HOCKENHEIM = (
     "S200 R68/69 S220 R45/102 R150/35 L150/35 S200 L160/47 R160/47 R35/89 S60 R95/84 S220 L40/155 "
     "S60 L90/52 R100/27 S45 R50/77 S45 R69.525/119 S280 S17.3"
 )
-_HOCKENHEIM_CLOSED_BY = (10, 22)  # the straight behind R35/89 and the last one take up about 1 m each
-_DIP_GRADE = 0.45 / (0.25 * 157.0)  # smooth steps to this grade and back make a dip of .45 m in 157 m
+# The straight behind R35/89 and the last one take up about 1 m each to close the circuit.
+_HOCKENHEIM_CLOSED_BY = (10, 22)
+# Smooth steps to this grade and back, twice, make a dip of .45 m in 157 m.
+_DIP_GRADE = 0.45 / (0.25 * 157.0)
 _HOCKENHEIM_GRADE = (
     (2000.0, 0.0),
     (2039.25, -_DIP_GRADE),
@@ -55,7 +57,8 @@ _RURAL = (
 
 _HEILBRONN_LENGTH = 5790.0
 _HEILBRONN_SEED = 5790
-_WIDEST_HEADING = math.radians(70.0)  # from the road's general direction, so that it never meets itself
+# From the general direction, so that the road never meets itself [rad]
+_WIDEST_HEADING = math.radians(70.0)
 _HEILBRONN_LIMITS = (
     (0.0, 50.0),
     (450.0, 70.0),
@@ -74,7 +77,7 @@ _HEILBRONN_STOPS = (
 
 
 def _hockenheim() -> Layout:
-    """Short circuit, 2597 m, clockwise, with banked corners and a dip (arc list: see the vehicle page)."""
+    """Short circuit, 2597 m, clockwise, with banked corners and a dip."""
     transition = 20.0
     elements = close_circuit(parse_layout(_HOCKENHEIM), transition, _HOCKENHEIM_CLOSED_BY)
     return Layout(
@@ -136,7 +139,7 @@ def _winding(random: np.random.Generator, length: float) -> tuple[Element, ...]:
 
 
 def _hills(random: np.random.Generator, length: float, steepest: float) -> Knots:
-    """Return grades that change every 250 m or so, up and down in turn, to `steepest`, level at both ends."""
+    """Return grades, up and down in turn every 250 m or so, to `steepest`, level at both ends."""
     count = round(length / 250.0)
     places = np.linspace(60.0, length - 60.0, count) + random.uniform(-40.0, 40.0, count)
     grades = random.uniform(0.2, 1.0, count) * np.resize([1.0, -1.0], count)
@@ -153,7 +156,8 @@ def _superelevation(elements: tuple[Element, ...], slope: float) -> Knots:
         if isinstance(element, Arc):
             inside = -slope if element.left else slope
             end = start + element.length
-            knots += [(start - 10.0, 0.0), (start + 10.0, inside), (end - 10.0, inside), (end + 10.0, 0.0)]
+            knots += [(start - 10.0, 0.0), (start + 10.0, inside)]
+            knots += [(end - 10.0, inside), (end + 10.0, 0.0)]
     return tuple(knots)
 
 
@@ -174,16 +178,16 @@ TRACK_NAMES = tuple(_LAYOUTS)
 def load_track(name: str, length: float | None = None) -> Track:
     """Return a track by name; `length` [m] is that of the straight one, which is 1 km without it.
 
-    Raises `RoadError` for an unknown name, naming the nearest choice, and for a length that is not positive or
-    belongs to another track.
+    Raises `RoadError` for an unknown name, naming the nearest choice, and for a length that is not
+    positive or given for another track.
     """
     if name not in _LAYOUTS:
-        choices = ", ".join(TRACK_NAMES)
-        raise RoadError(f"track '{name}' is not known; choose {choices}{did_you_mean(name, TRACK_NAMES)}")
+        choices = ", ".join(TRACK_NAMES) + did_you_mean(name, TRACK_NAMES)
+        raise RoadError(f"track '{name}' is not known; choose {choices}")
     layout = _LAYOUTS[name]()
     if length is not None:
         if name != "straight":
-            raise RoadError(f"the length of track '{name}' is fixed; only the straight takes a length_m")
+            raise RoadError(f"track '{name}' has its own length; only the straight takes one")
         if not 0.0 < length <= 20_000.0:
             raise RoadError(f"length_m is {length:g} m; it must be above 0 m and at most 20000 m")
         layout = replace(layout, elements=(Straight(float(length)),))

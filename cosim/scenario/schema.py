@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -340,17 +341,20 @@ class Scenario(Model):
         return self._source.locate(key)
 
     def problem(
-        self, key: Key, message: str, choices: Sequence[str] = (), at_key: bool = False
+        self, key: Key, message: str, choices: Sequence[str] = (), name: str = ""
     ) -> Problem:
         """Return a problem at `key` for a later check to raise in an `InputError`.
 
-        With `choices`, the sentence ends with the choice nearest to the key's last part. With
-        `at_key` the name is underlined, not the value.
+        With `choices`, the sentence ends with the choice nearest to `name`, the word that is wrong.
+        Where that is the key's own last part, the key is underlined, else the value.
         """
-        hint = did_you_mean(str(key[-1]), choices) if choices else ""
+        wrong = name or str(key[-1])
+        hint = did_you_mean(wrong, choices) if choices else ""
+        at_key = bool(choices) and wrong == key[-1]
         return Problem(message + hint, self._source.locate(key, at_key))
 
 
+@cache
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file."""
     return {"$schema": SCHEMA_ID, **Scenario.model_json_schema(by_alias=True)}

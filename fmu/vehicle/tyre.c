@@ -13,8 +13,10 @@ static double shape(double B, double E, double s) {
     return atan(Bs - e * (Bs - atan(Bs)));
 }
 
+static double sine_of_twice_atan(double z) { return 2 * z / (1 + z * z); }
+
 double tyre_relaxation_y(const Variables *p, double Fz, double radius) { /* eq. 4.E (PAC2002: sigma_alpha) */
-    const double length = p->Tire_PTY1 * sin(2 * atan(Fz / (p->Tire_PTY2 * p->Tire_NominalLoad))) * radius;
+    const double length = p->Tire_PTY1 * sine_of_twice_atan(Fz / (p->Tire_PTY2 * p->Tire_NominalLoad)) * radius;
     return length > 0.05 ? length : 0.05;
 }
 
@@ -26,10 +28,11 @@ double tyre_rolling_radius(const Variables *p, double Fz, double radius) {
 
 typedef struct { double Fx, Fy, Mz, peak_x, peak_y; } Forces;
 
-static Forces magic_formula(const Variables *p, double Fz, double kappa, double alpha, double gamma, double side) {
+static Forces magic_formula(const Variables *p, double Fz, double kappa, double tan_alpha, double gamma, double side) {
     const double Fz0 = p->Tire_NominalLoad, d = (Fz - Fz0) / Fz0, gamma2 = gamma * gamma;
+    const double alpha = side * atan(tan_alpha);
     Forces f;
-    alpha *= side, gamma *= side;
+    gamma *= side;
 
     f.peak_x = (p->Tire_PDX1 + p->Tire_PDX2 * d) * p->Tire_FrictionX * p->Road_Friction * Fz;
     const double Kx = Fz * (p->Tire_PKX1 + p->Tire_PKX2 * d) * exp(p->Tire_PKX3 * d);
@@ -37,7 +40,7 @@ static Forces magic_formula(const Variables *p, double Fz, double kappa, double 
     const double Fx0 = f.peak_x * sin(p->Tire_PCX1 * shape(Kx / (p->Tire_PCX1 * f.peak_x), Ex, kappa));
 
     f.peak_y = (p->Tire_PDY1 + p->Tire_PDY2 * d) * (1 - p->Tire_PDY3 * gamma2) * p->Tire_FrictionY * p->Road_Friction * Fz;
-    const double Ky = p->Tire_PKY1 * Fz0 * sin(2 * atan(Fz / (p->Tire_PKY2 * Fz0))) * (1 - p->Tire_PKY3 * fabs(gamma));
+    const double Ky = p->Tire_PKY1 * Fz0 * sine_of_twice_atan(Fz / (p->Tire_PKY2 * Fz0)) * (1 - p->Tire_PKY3 * fabs(gamma));
     const double sign = alpha < 0 ? -1 : 1;
     const double Ey = (p->Tire_PEY1 + p->Tire_PEY2 * d) * (1 - (p->Tire_PEY3 + p->Tire_PEY4 * gamma) * sign);
     const double Fy0 = f.peak_y * sin(p->Tire_PCY1 * shape(Ky / (p->Tire_PCY1 * f.peak_y), Ey, alpha));
@@ -49,9 +52,10 @@ static Forces magic_formula(const Variables *p, double Fz, double kappa, double 
            cos(p->Tire_RCX1 * shape(Bx, p->Tire_REX1, p->Tire_RHX1));
     const double Fy = Fy0 * cos(p->Tire_RCY1 * shape(By, p->Tire_REY1, kappa)); /* RHY1 = 0: no denominator */
 
-    const double ratio = Kx * kappa / Ky, tan_alpha = tan(alpha);
+    const double ratio = Kx * kappa / Ky;
     const double equivalent = sign * atan(sqrt(tan_alpha * tan_alpha + ratio * ratio)); /* combined slip, eq. 4.E */
-    const double trail = Fz * p->Tire_QDZ1 * p->Tire_Radius / Fz0 * cos(p->Tire_QCZ1 * shape(p->Tire_QBZ1, p->Tire_QEZ1, equivalent)) * cos(alpha);
+    const double trail = Fz * p->Tire_QDZ1 * p->Tire_Radius / Fz0 * cos(p->Tire_QCZ1 * shape(p->Tire_QBZ1, p->Tire_QEZ1, equivalent)) /
+                         sqrt(1 + tan_alpha * tan_alpha);
     f.Fy = side * Fy;
     f.Mz = -trail * f.Fy;
     return f;
@@ -84,7 +88,7 @@ void tyre_forces(const Variables *p, const Vehicle *c, const State *x, Work *w, 
     y->stretch_x_rate = stretch_rate(y->slip_x, MAX_SLIP_X, V_sx, V_x);
     y->stretch_y_rate = stretch_rate(-y->slip_y, MAX_SLIP_Y, V_sy, V_x);
 
-    const Forces f = magic_formula(p, y->Fz, y->slip_x, atan(y->slip_y), t->sine_inclination, c->side[i]);
+    const Forces f = magic_formula(p, y->Fz, y->slip_x, y->slip_y, t->sine_inclination, c->side[i]);
     const double fade = clamp(1 - fabs(V_x) / p->Tire_StandstillSpeed, 0, 1);
     const double extra = p->Tire_StandstillDamping * fade * fade * (3 - 2 * fade);
     y->Fx = clamp(f.Fx + (p->Tire_CarcassDampingX + extra) * y->stretch_x_rate, -f.peak_x, f.peak_x);

@@ -1,0 +1,145 @@
+"""Data sets for training: laps driven by the loop itself, one Parquet file per run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cosim.errors import InputError
+
+Array = npt.NDArray[np.float64]
+Dampers = Literal["passive", "switching"]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Selection(_Part):
+    """Scenario files by a glob pattern relative to the recipe, each driven once per kind of dampers."""
+
+    scenarios: str = Field(min_length=1)
+    dampers: tuple[Dampers, ...] = Field(min_length=1)
+
+
+class DatasetRecipe(_Part):
+    """Which runs make a data set; run i has the seed 1000 * `seed` + i for surface and dampers."""
+
+    name: str
+    seed: int = Field(ge=0)
+    runs: tuple[Selection, ...] = Field(min_length=1)
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run: its scenario file, its dampers and its seed; `stem` names its file."""
+
+    scenario: Path
+    dampers: Dampers
+    seed: int
+
+    @property
+    def stem(self) -> str:
+        """File name without ending, `<scenario>_<dampers>`."""
+        return f"{self.scenario.stem}_{self.dampers}"
+
+
+def load_recipe(path: Path) -> DatasetRecipe:
+    """Read a recipe; raises `InputError` naming the file and everything wrong in it."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        return DatasetRecipe.model_validate(YAML(typ="safe").load(path.read_text("utf-8")))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+    except YAMLError as error:
+        raise InputError(f"{path}: {' '.join(str(error).split())}") from None
+    except ValidationError as error:
+        sentences = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
+        raise InputError(f"{path}: " + "; ".join(sentences)) from None
+
+
+def plan(recipe: DatasetRecipe, folder: Path) -> list[PlannedRun]:
+    """Return the runs in a fixed order; raises `InputError` for a pattern that matches nothing."""
+    chosen: list[tuple[Path, Dampers]] = []
+    for selection in recipe.runs:
+        files = sorted(folder.glob(selection.scenarios))
+        if not files:
+            raise InputError(f"no scenario in {folder} matches '{selection.scenarios}'")
+        chosen += [(file, dampers) for file in files for dampers in selection.dampers]
+    return [
+        PlannedRun(file, dampers, 1000 * recipe.seed + i)
+        for i, (file, dampers) in enumerate(chosen)
+    ]
+
+
+def build(
+    runs: list[PlannedRun],
+    directory: Path,
+    executor: Executor,
+    progress: Callable[[str], None] = lambda stem: None,
+) -> None:
+    """Drive every run whose file is not there yet and write it to `directory`."""
+    directory.mkdir(parents=True, exist_ok=True)
+    missing = [run for run in runs if not (directory / f"{run.stem}.parquet").is_file()]
+    for stem in executor.map(drive, missing, [directory] * len(missing)):
+        progress(stem)
+
+
+def drive(planned: PlannedRun, directory: Path) -> str:
+    """Drive one run without a sensor, write it, and return its stem."""
+    from cosim.assembly import STEP_S, assemble
+    from cosim.controller import SwitchingDampers
+    from cosim.scenario.load import load
+    from sensor.dataset import Run, write_run
+
+    scenario = load(planned.scenario, [f"seed={planned.seed}"])
+    switching = planned.dampers == "switching"
+    dampers = SwitchingDampers(planned.seed, STEP_S) if switching else None
+    assembly = assemble(scenario, scenario.controllers[0], NoSensor(), dampers)
+    result = assembly.run(None)
+    if result.lap_time_s is None:
+        raise InputError(f"{planned.scenario}: the lap was not finished, so it is no training run")
+    record = assembly.recorder
+    recipe = {"scenario": planned.scenario.name, "dampers": planned.dampers, "seed": planned.seed}
+    run = Run(
+        planned.stem,
+        record.group("channels").astype(np.float32),
+        record.group("truth").astype(np.float32),
+        recipe,
+    )
+    part = directory / f".{planned.stem}.part"
+    write_run(part, run)
+    part.replace(directory / f"{planned.stem}.parquet")
+    return planned.stem
+
+
+class NoSensor:
+    """Stands where the sensor belongs while the data to train it are driven; never valid."""
+
+    def __init__(self) -> None:
+        self.estimate: Array = np.full(4, np.nan)
+
+    def step(self, measured: Array) -> bool:
+        """Return False."""
+        return False
+
+
+
+def drive_all(recipe_file: Path, directory: Path, workers: int, progress: Callable[[str], None]) -> int:
+    """Drive a recipe's runs in spawned processes, one FMU instance each; return how many there are."""
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    runs = plan(load_recipe(recipe_file), recipe_file.parent)
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as executor:
+        build(runs, directory, executor, progress)
+    return len(runs)

@@ -1,0 +1,267 @@
+"""The variable table of a model: reads ``variables.toml`` and checks it.
+
+A name holding ``@`` stands for four variables, one to a corner, and becomes an array of four in C.
+"""
+
+import math
+import re
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+CORNERS = ("FL", "FR", "RL", "RR")
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+FIRST_REFERENCE = {"Float64": 0, "Boolean": 100_000, "String": 200_000}
+TIME_REFERENCE = 999_999
+STRING_SIZE = 1024
+LAYER_CATEGORY = ("logStatusError", "A call failed; the message says why")
+VARIABILITIES = {
+    "parameter": ("fixed", "tunable"),
+    "input": ("continuous", "discrete"),
+    "output": ("continuous", "discrete"),
+}
+MODEL_KEYS = {
+    "name", "identifier", "description", "author", "license", "log_categories",
+    "step_size", "stop_time",
+}  # fmt: skip
+VARIABLE_KEYS = {
+    "name", "type", "unit", "display", "quantity", "description", "start", "min", "max", "nominal",
+    "causality", "variability",
+}  # fmt: skip
+
+Start = float | bool | str
+
+
+class TableError(Exception):
+    """Everything wrong with a variable table, one sentence to a line."""
+
+
+@dataclass(frozen=True)
+class DisplayUnit:
+    """A unit for people: value in it = factor * SI value + offset."""
+
+    name: str
+    factor: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit by its SI exponents: SI value = factor * value."""
+
+    name: str
+    base: dict[str, int]
+    factor: float
+    display: tuple[DisplayUnit, ...]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One scalar variable, as an FMU shows it."""
+
+    name: str
+    type: str
+    causality: str
+    variability: str
+    description: str
+    start: Start
+    field: str  # how C addresses it inside Variables: "Car_ax" or "Car_Fz[2]"
+    reference: int = 0
+    unit: str = ""
+    display: str = ""
+    quantity: str = ""
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    nominal: float | None = None
+
+
+@dataclass(frozen=True)
+class Field:
+    """One member of the C struct ``Variables``."""
+
+    name: str
+    type: str
+    count: int  # 4 for an array over the corners, else 1
+    comment: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """A whole ``variables.toml``."""
+
+    model: dict[str, Any]
+    units: tuple[Unit, ...]
+    fields: tuple[Field, ...]
+    variables: tuple[Variable, ...]
+    terminals: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def of_type(self, kind: str) -> list[Variable]:
+        """Variables of one type, in the order of their value references."""
+        return [v for v in self.variables if v.type == kind]
+
+
+def field_name(name: str) -> str:
+    """C name of a variable: ``Car.C@.q0`` -> ``Car_C_q0``."""
+    return re.sub("_+", "_", name.replace("@", "").replace(".", "_")).strip("_")
+
+
+def _unknown(where: str, given: set[str], known: set[str]) -> list[str]:
+    return [f"{where}: unknown key '{key}'" for key in sorted(given - known)]
+
+
+def _read_unit(name: str, raw: dict[str, Any], problems: list[str]) -> Unit:
+    problems += _unknown(f"unit '{name}'", set(raw), {"base", "factor", "display"})
+    problems += [
+        f"unit '{name}': '{key}' is not an SI base unit"
+        for key in raw.get("base", {})
+        if key not in BASE_UNITS
+    ]
+    display = [
+        DisplayUnit(d["name"], float(d.get("factor", 1.0)), float(d.get("offset", 0.0)))
+        for d in raw.get("display", [])
+    ]
+    return Unit(name, raw.get("base", {}), float(raw.get("factor", 1.0)), tuple(display))
+
+
+def _starts(raw: dict[str, Any], kind: str, count: int, problems: list[str]) -> list[Start]:
+    """Start values of the scalars of one entry, in the type of the variable."""
+    types = {"Float64": (int, float), "Boolean": (bool,), "String": (str,)}[kind]
+    start = raw.get("start", {"Float64": 0.0, "Boolean": False, "String": ""}[kind])
+    values = start if isinstance(start, list) else [start] * count
+    if len(values) != count:
+        problems.append(f"{raw['name']}: {len(values)} start values for {count} variables")
+        values = [values[0]] * count
+    bad = [v for v in values if not isinstance(v, types) or (kind == "Float64" and v is True)]
+    if bad:
+        problems.append(f"{raw['name']}: start value {bad[0]!r} is not of type {kind}")
+        values = [types[-1]() for _ in values]
+    return [float(v) for v in values] if kind == "Float64" else values
+
+
+def _check(variable: Variable, units: dict[str, Unit], raw: dict[str, Any]) -> list[str]:
+    """What is wrong with one variable."""
+    name, problems = variable.name, []
+    if variable.variability not in VARIABILITIES.get(variable.causality, ()):
+        problems.append(
+            f"{name}: causality '{variable.causality}' with variability '{variable.variability}'"
+        )
+    if variable.causality == "output" and "start" in raw:
+        problems.append(f"{name}: an output is calculated and has no start value")
+    if not variable.description:
+        problems.append(f"{name}: no description")
+    if variable.type != "Float64":
+        return problems
+    if variable.unit not in units:
+        problems.append(f"{name}: unit '{variable.unit}' is not defined in [units]")
+    elif variable.display not in ["", *(d.name for d in units[variable.unit].display)]:
+        problems.append(
+            f"{name}: display unit '{variable.display}' is not one of unit '{variable.unit}'"
+        )
+    if not variable.minimum <= variable.maximum:
+        problems.append(f"{name}: min {variable.minimum} is above max {variable.maximum}")
+    has_start = variable.causality != "output"
+    if has_start and not variable.minimum <= float(variable.start) <= variable.maximum:
+        problems.append(
+            f"{name}: start {variable.start} {variable.unit} is outside"
+            f" {variable.minimum} to {variable.maximum} {variable.unit}"
+        )
+    return problems
+
+
+def _expand(raw: dict[str, Any], problems: list[str]) -> tuple[Field, list[Variable]]:
+    """One entry of the table: its C field and its one or four variables."""
+    name, kind = raw["name"], raw.get("type", "Float64")
+    problems += _unknown(name, set(raw), VARIABLE_KEYS)
+    if kind not in FIRST_REFERENCE:
+        problems.append(f"{name}: type '{kind}' is none of {', '.join(FIRST_REFERENCE)}")
+        kind = "Float64"
+    causality = raw.get("causality", "")
+    natural = VARIABILITIES.get(causality, ("",))[0]
+    if kind != "Float64" and natural == "continuous":
+        natural = "discrete"
+    corners = CORNERS if "@" in name else ("",)
+    starts = _starts(raw, kind, len(corners), problems)
+    description = raw.get("description", "")
+    c_name = field_name(name)
+    variables = [
+        Variable(
+            name=name.replace("@", corner),
+            type=kind,
+            causality=causality,
+            variability=raw.get("variability", natural),
+            description=description.replace("@", corner),
+            start=start,
+            field=f"{c_name}[{i}]" if corner else c_name,
+            unit=raw.get("unit", ""),
+            display=raw.get("display", ""),
+            quantity=raw.get("quantity", ""),
+            minimum=float(raw.get("min", -math.inf)),
+            maximum=float(raw.get("max", math.inf)),
+            nominal=raw.get("nominal"),
+        )
+        for i, (corner, start) in enumerate(zip(corners, starts, strict=True))
+    ]
+    comment = f"{description} [{raw['unit']}]" if "unit" in raw else description
+    return Field(c_name, kind, len(corners), comment), variables
+
+
+def _number(variables: list[Variable]) -> tuple[Variable, ...]:
+    """Value references: counted up within each type, in the order of the table."""
+    following = dict(FIRST_REFERENCE)
+    numbered = []
+    for v in variables:
+        numbered.append(Variable(**{**vars(v), "reference": following[v.type]}))
+        following[v.type] += 1
+    return tuple(numbered)
+
+
+def _repeated(names: list[str], what: str) -> list[str]:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    return [f"{name}: this {what} appears twice" for name in twice]
+
+
+def _read_model(raw: dict[str, Any], problems: list[str]) -> dict[str, Any]:
+    problems += _unknown("[model]", set(raw), MODEL_KEYS)
+    problems += [
+        f"[model]: no '{key}'" for key in ("name", "identifier", "description") if key not in raw
+    ]
+    categories = [tuple(c) for c in raw.get("log_categories", [])]
+    if LAYER_CATEGORY[0] not in [c[0] for c in categories]:
+        categories.insert(0, LAYER_CATEGORY)
+    return {"step_size": 0.01, "stop_time": 10.0, **raw, "log_categories": categories}
+
+
+def read_table(path: Path) -> Table:
+    """Read and check ``variables.toml``; raises TableError with all problems at once."""
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise TableError(f"{path}: {error}") from error
+    problems = _unknown(path.name, set(raw), {"model", "units", "group", "terminals"})
+    model = _read_model(raw.get("model", {}), problems)
+    units = {n: _read_unit(n, u, problems) for n, u in raw.get("units", {}).items()}
+    units.setdefault("s", Unit("s", {"s": 1}, 1.0, ()))  # of FMI 3's independent variable
+    fields, variables = [], []
+    for group in raw.get("group", []):
+        common = {key: value for key, value in group.items() if key != "variables"}
+        for entry in group["variables"]:
+            merged = {**common, **entry}
+            new_field, expanded = _expand(merged, problems)
+            fields.append(new_field)
+            variables += expanded
+            for variable in expanded:
+                problems += _check(variable, units, merged)
+    problems += _repeated([v.name for v in variables], "variable")
+    problems += _repeated([f.name for f in fields], "C name")
+    terminals = raw.get("terminals", {})
+    names = {v.name for v in variables}
+    problems += [
+        f"terminal '{t}': there is no variable '{n}'"
+        for t, terminal in terminals.items()
+        for n in terminal.get("members", [])
+        if n not in names
+    ]
+    if problems:
+        raise TableError("\n".join(f"{path}: {p}" for p in problems))
+    return Table(model, tuple(units.values()), tuple(fields), _number(variables), terminals)

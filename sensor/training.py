@@ -1,0 +1,256 @@
+"""The training loop: each epoch sees a seeded random part of the windows, and the best epoch in
+validation is kept.
+
+Every random draw depends on (seed, epoch) alone, so a training resumed from its checkpoint ends in
+the same weights as one that was never interrupted.
+"""
+
+import json
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from sensor.dataset import Normalisation, Run, WindowSet, read_runs
+from sensor.errors import SensorError
+from sensor.network import BiLstmNetwork, NetworkConfig
+from sensor.provenance import versions
+from sensor.recipe import Recipe, TrainingRecipe, read_recipe
+
+_VALIDATION_BATCH = 2048
+
+
+@dataclass
+class Progression:
+    """What has been reached: a record per epoch, the best validation RMSE [m/s], and the weights
+    that gave it.
+    """
+
+    epochs: list[dict[str, float]] = field(default_factory=list)
+    best_rmse: float = math.inf
+    best_epoch: int = 0
+    best_weights: dict[str, torch.Tensor] = field(default_factory=dict)
+
+
+def train(data: Path, recipe_path: Path, out: Path, *, resume: bool = False) -> BiLstmNetwork:
+    """Train by the recipe on the runs in `data`; write checkpoint, `training.json` and the ONNX
+    network to `out`.
+
+    Returns the network of the best epoch. Raises SensorError if recipe or data do not fit.
+    """
+    from sensor.export import export_windowed
+
+    recipe = read_recipe(recipe_path)
+    training, validation = (
+        read_runs(data, patterns) for patterns in (recipe.runs.training, recipe.runs.validation)
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    network, record = fit(recipe, training, validation, out, resume=resume)
+    window = recipe.network.window
+    export_windowed(network, out / f"bilstm_w{window}.onnx", training=record)
+    return network
+
+
+def fit(
+    recipe: Recipe, training: Sequence[Run], validation: Sequence[Run], out: Path, *, resume: bool
+) -> tuple[BiLstmNetwork, dict[str, Any]]:
+    """Train on runs already read; return the network of the best epoch and the training record."""
+    torch.set_num_threads(recipe.training.threads)
+    torch.manual_seed(recipe.seed)
+    normalisation = Normalisation.of(training)
+    shape = recipe.network
+    network = BiLstmNetwork(
+        NetworkConfig(shape.window, units=shape.units, hidden=shape.hidden, dropout=shape.dropout)
+    )
+    for name, values in asdict(normalisation).items():
+        getattr(network, name).copy_(torch.from_numpy(values))
+    trainer = Trainer(
+        recipe,
+        network,
+        WindowSet(training, shape.window, normalisation),
+        WindowSet(validation, shape.window, normalisation),
+    )
+    if resume:
+        trainer.load(out / "checkpoint.pt")
+    description = _describe(recipe, training, validation)
+    with _progress() as progress:
+        task = progress.add_task("epoch", total=recipe.training.epochs)
+        for epoch in range(len(trainer.reached.epochs), recipe.training.epochs):
+            progress.update(task, completed=epoch, description=trainer.summary())
+            trainer.run_epoch(epoch)
+            trainer.save(out / "checkpoint.pt")
+            _write_json(out / "training.json", description | trainer.record())
+        progress.update(task, completed=recipe.training.epochs, description=trainer.summary())
+    network.load_state_dict(trainer.reached.best_weights)
+    return network.eval(), description | trainer.record()
+
+
+class Trainer:
+    """One training in progress: network, optimiser and what has been reached."""
+
+    def __init__(
+        self, recipe: Recipe, network: BiLstmNetwork, training: WindowSet, validation: WindowSet
+    ) -> None:
+        self.recipe, self.network = recipe, network
+        self.training, self.validation = training, validation
+        self.optimiser = torch.optim.Adam(network.parameters(), lr=recipe.training.learning_rate)
+        self.reached = Progression()
+
+    def run_epoch(self, epoch: int) -> None:
+        """Train one epoch, validate, keep the weights if they are the best so far."""
+        start = time.perf_counter()
+        settings = self.recipe.training
+        rate = learning_rate(settings, epoch)
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        torch.manual_seed(
+            int(np.random.SeedSequence([self.recipe.seed, epoch]).generate_state(1)[0])
+        )
+        windows = self.training.subset(settings.windows_per_epoch, (self.recipe.seed, epoch))
+        training_rmse = self._train(windows)
+        validation_rmse = self.validate()
+        if not math.isfinite(validation_rmse):
+            raise SensorError(
+                f"the training diverged in epoch {epoch + 1}; lower the learning rate."
+            )
+        reached = self.reached
+        reached.epochs.append(
+            {
+                "epoch": epoch + 1,
+                "training_rmse": training_rmse,
+                "validation_rmse": validation_rmse,
+                "learning_rate": rate,
+                "seconds": round(time.perf_counter() - start, 3),
+            }
+        )
+        if validation_rmse < reached.best_rmse:
+            reached.best_rmse, reached.best_epoch = validation_rmse, epoch + 1
+            state = self.network.state_dict()
+            reached.best_weights = {name: value.clone() for name, value in state.items()}
+
+    def _train(self, windows: npt.NDArray[np.int64]) -> float:
+        """One pass over the windows; return the RMSE [m/s] met on the way, dropout active."""
+        self.network.train()
+        total = torch.zeros(self.network.config.outputs)
+        for measured, truth in self.training.batches(windows, self.recipe.training.batch_size):
+            with self._precision():
+                estimate = self.network.standardised(torch.from_numpy(measured))
+            square = (estimate.float() - torch.from_numpy(truth)).square()
+            self.optimiser.zero_grad()
+            square.mean().backward()  # type: ignore[no-untyped-call]
+            self.optimiser.step()
+            total += square.detach().sum(dim=0)
+        return self._pooled_rmse(total, len(windows))
+
+    @torch.no_grad()
+    def validate(self) -> float:
+        """RMSE [m/s] on the validation windows, the same at every epoch, all wheels pooled."""
+        self.network.eval()
+        windows = self.validation.subset(
+            self.recipe.training.validation_windows, (self.recipe.seed,)
+        )
+        total = torch.zeros(self.network.config.outputs)
+        for measured, truth in self.validation.batches(windows, _VALIDATION_BATCH):
+            estimate = self.network.standardised(torch.from_numpy(measured))
+            total += (estimate - torch.from_numpy(truth)).square().sum(dim=0)
+        return self._pooled_rmse(total, len(windows))
+
+    def _pooled_rmse(self, squares: torch.Tensor, count: int) -> float:
+        """From sums of squared standardised errors (4,) over `count` windows to m/s."""
+        return float((squares * self.network.output_std.square()).mean().div(count).sqrt())
+
+    def _precision(self) -> torch.autocast:
+        bf16 = self.recipe.training.precision == "bf16"
+        return torch.autocast("cpu", torch.bfloat16, enabled=bf16)
+
+    def save(self, path: Path) -> None:
+        """Write the checkpoint, whole or not at all."""
+        temporary = path.with_suffix(".part")
+        torch.save(
+            {
+                "recipe": self.recipe.model_dump_json(),
+                "network": self.network.state_dict(),
+                "optimiser": self.optimiser.state_dict(),
+                "reached": asdict(self.reached),
+            },
+            temporary,
+        )
+        temporary.replace(path)
+
+    def load(self, path: Path) -> None:
+        """Go on from a checkpoint; raises SensorError if there is none or it belongs to another
+        recipe.
+        """
+        if not path.is_file():
+            raise SensorError(f"{path}: there is no checkpoint to go on from.")
+        checkpoint = torch.load(path, weights_only=True)
+        # A longer training of the same recipe may go on from here, so `epochs` may differ.
+        if _without_epochs(Recipe.model_validate_json(checkpoint["recipe"])) != _without_epochs(
+            self.recipe
+        ):
+            raise SensorError(f"{path}: the checkpoint was made by another recipe.")
+        self.network.load_state_dict(checkpoint["network"])
+        self.optimiser.load_state_dict(checkpoint["optimiser"])
+        self.reached = Progression(**checkpoint["reached"])
+
+    def summary(self) -> str:
+        """One short line for the progress display."""
+        if not self.reached.epochs:
+            return "first epoch"
+        last = self.reached.epochs[-1]
+        return (
+            f"epoch {last['epoch']:.0f}: validation {1e3 * last['validation_rmse']:.2f} mm/s, "
+            f"best {1e3 * self.reached.best_rmse:.2f} (epoch {self.reached.best_epoch})"
+        )
+
+    def record(self) -> dict[str, Any]:
+        """What `training.json` says of the course of the training."""
+        return {
+            "best_epoch": self.reached.best_epoch,
+            "best_validation_rmse": self.reached.best_rmse,
+            "epochs": self.reached.epochs,
+        }
+
+
+def learning_rate(settings: TrainingRecipe, epoch: int) -> float:
+    """Learning rate of an epoch (counted from 0) by the recipe's schedule."""
+    if settings.schedule == "cosine":
+        return settings.learning_rate * 0.5 * (1.0 + math.cos(math.pi * epoch / settings.epochs))
+    if settings.schedule == "step" and 3 * epoch >= 2 * settings.epochs:
+        return 0.1 * settings.learning_rate
+    return settings.learning_rate
+
+
+def _without_epochs(recipe: Recipe) -> dict[str, Any]:
+    return recipe.model_dump(exclude={"training": {"epochs"}})
+
+
+def _describe(recipe: Recipe, training: Sequence[Run], validation: Sequence[Run]) -> dict[str, Any]:
+    """What `training.json` says of recipe, versions and data."""
+    data = {
+        part: {run.name: len(run.channels) for run in runs}
+        for part, runs in (("training", training), ("validation", validation))
+    }
+    return {"recipe": recipe.model_dump(mode="json"), "versions": versions(), "samples": data}
+
+
+def _progress() -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

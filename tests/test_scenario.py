@@ -1,0 +1,275 @@
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from cosim.errors import InputError
+from cosim.run import resolved_yaml
+from cosim.scenario.load import load
+from cosim.scenario.overrides import split_key
+from cosim.scenario.schema import json_schema
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+FILES = sorted(SCENARIOS.rglob("*.yaml"))
+GOOD = """\
+name: a scenario
+road:
+  track: hockenheim
+driver:
+  style: normal
+"""
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scenario") / "good.yaml"
+    path.write_text(GOOD)
+    return path
+
+
+def problems(tmp_path, text, overrides=()):
+    """Return the messages for a scenario as (line, column, message)."""
+    path = tmp_path / "scenario.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load(path, overrides)
+    return [
+        (p.place.line if p.place else 0, p.place.column if p.place else 0, p.message)
+        for p in caught.value.problems
+    ]
+
+
+def test_defaults(good):
+    scenario = load(good)
+    assert scenario.duration == "lap"
+    assert scenario.road.surface.kind == "smooth"
+    assert [controller.label for controller in scenario.controllers] == ["passive"]
+    assert scenario.output.format == "csv"
+
+
+def test_all_problems_at_once_each_at_its_place(tmp_path):
+    found = problems(
+        tmp_path,
+        "name: x\n"
+        "duration: -3\n"
+        "road: {track: hockenhiem}\n"
+        "driver:\n"
+        "  sped_kmh: 50\n"
+        "  speed_kmh: 0\n"
+        "vehicle:\n"
+        "  step_s: fast\n"
+        "sensor: {network: gone.onnx}\n"
+        "controllers:\n"
+        "  - kind: skyhok\n"
+        "limits:\n"
+        "  - {metric: network.overal.rmse_m_s, max: 1}\n",
+    )
+    assert [(line, column) for line, column, _ in found] == [
+        (2, 11),
+        (3, 15),
+        (5, 3),
+        (6, 14),
+        (8, 11),
+        (9, 19),
+        (11, 5),
+        (13, 14),
+    ]
+    messages = [message for *_, message in found]
+    assert messages[0] == "duration must be 'lap' or a number of seconds greater than 0, not -3"
+    assert messages[1].endswith("not 'hockenhiem'; did you mean 'hockenheim'?")
+    assert messages[2] == "'sped_kmh' is not a field of driver; did you mean 'speed_kmh'?"
+    assert messages[3] == "driver.speed_kmh must be greater than 0 km/h, not 0 km/h"
+    assert messages[4] == "vehicle.step_s must be a number in s, not 'fast'"
+    assert "there is no file" in messages[5]
+    assert messages[6].endswith("not 'skyhok'; did you mean 'skyhook'?")
+    assert messages[7].endswith("did you mean 'network.overall.rmse_m_s'?")
+
+
+def test_a_field_in_the_wrong_section_is_sent_to_the_right_one(tmp_path):
+    assert "it belongs to driver" in problems(tmp_path, GOOD + "speed_kmh: 50\n")[0][2]
+    assert "it belongs to the top level" in problems(tmp_path, GOOD + "  seed: 3\n")[0][2]
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("", "is empty"),
+        ("- a\n- b\n", "a scenario is a mapping"),
+        ("name: [a\nroad: 1\n", "not YAML 1.2"),
+        ("name: a\n\troad: 1\n", "not YAML 1.2"),
+        ("name: a\n---\nname: b\n", "not YAML 1.2"),
+        ("name: !!python/object:os.x {}\n", "not YAML 1.2"),
+        ("name: &a [*a]\n", "inside its own anchor"),
+        ("name: a\n", "the scenario has no road, which it needs"),
+        ("name: a\nroad: {track: straight}\n", "needs its length_m"),
+        ("name: a\nroad: {track: rural, length_m: 50}\n", "straight track only"),
+        ("name: a\nroad: {track: rural, file: a.crg}\n", "either track or file"),
+        ("name: a\nroad: {}\n", "either track or file"),
+        ("name: a\nroad: {file: a.txt}\n", "an OpenCRG road (.crg)"),
+        ("name: a\nroad: {track: rural, surface: {kind: iso8608}}\n", "has no class"),
+        ("name: a\nroad: {track: rural, surface: {class: A}}\n", "has no kind"),
+        (GOOD + "limits: [{metric: lap_time_s}]\n", "needs min, max or both"),
+        (GOOD + "limits: [{metric: lap_time_s, min: 2, max: 1}]\n", "not be greater than max"),
+        (GOOD + "controllers: []\n", "controllers must not be empty"),
+        (GOOD + "controllers: [{kind: passive}, {kind: passive}]\n", "two runs are called"),
+        (GOOD + "paper_row: Rural track, Normal diver\n", "'Rural track, Normal driver'"),
+        (GOOD + "vehicle: {fmu: my.fmi}\n", "'builtin' or an FMU (.fmu)"),
+        (GOOD + "vehicle: {parameters: {Body.Mass: [1]}}\n", "must be one number"),
+        (GOOD + "seed: true\n", "seed must be a whole number, not true"),
+        (GOOD + "seed: 1.5\n", "seed must be a whole number, not 1.5"),
+        (GOOD + "  speed_kmh: .inf\n", "driver.speed_kmh must be"),
+        (GOOD + "duration: .nan\n", "duration must be 'lap'"),
+    ],
+)
+def test_bad_input_is_one_clear_sentence(tmp_path, text, part):
+    found = problems(tmp_path, text)
+    assert any(part in message for *_, message in found), found
+    assert all("\n" not in message for *_, message in found)
+
+
+def test_yaml_1_2(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text(
+        "name: no\nroad: {track: straight, length_m: 1e3}\nvehicle: {step_s: 1e-3}\nseed: 010\n"
+    )
+    scenario = load(path)
+    assert (scenario.name, scenario.road.length_m, scenario.vehicle.step_s) == ("no", 1000, 0.001)
+    assert scenario.seed == 10
+
+
+@settings(deadline=None)
+@given(st.integers(0, 3), st.integers(0, 3))
+def test_a_doubled_key_is_reported_with_both_lines(tmp_path_factory, above, between):
+    filler = [f"p{index}: {index}" for index in range(above + between)]
+    lines = [*filler[:above], "Body.Mass: 1", *filler[above:], "Body.Mass: 2"]
+    text = GOOD + "vehicle:\n  parameters:\n" + "".join(f"    {line}\n" for line in lines)
+    found = problems(tmp_path_factory.mktemp("doubled"), text)
+    first, second = 8 + above, 8 + len(lines) - 1
+    assert found == [(second, 5, f"'Body.Mass' is already given in line {first}")]
+
+
+@settings(deadline=None)
+@given(st.text("abcdefghij", min_size=3, max_size=12), st.integers(0, 5), st.integers(1, 6))
+def test_an_unknown_field_is_found_wherever_it_stands(tmp_path_factory, name, blank, indent):
+    text = "name: x\nroad: {track: rural}\n" + "\n" * blank + "driver:\n" + " " * indent + name
+    path = tmp_path_factory.mktemp("position")
+    found = problems(path, text + "_z: 1\n")
+    assert (4 + blank, indent + 1) in [(line, column) for line, column, _ in found]
+
+
+@settings(deadline=None)
+@given(st.floats(1, 200))
+def test_set_is_the_same_as_writing_it_in_the_file(good, speed):
+    path = good.with_name("written.yaml")
+    path.write_text(GOOD + f"  speed_kmh: {speed!r}\n")
+    assert load(good, [f"driver.speed_kmh={speed!r}"]).driver == load(path).driver
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from(
+        [
+            "driver.style=fast",
+            "seed=-1",
+            "drver.style=normal",
+            "seed",
+            "=1",
+            "controllers.3.kind=passive",
+            "name.first=a",
+            "seed=[",
+            "road.x=1",
+        ]
+    )
+)
+def test_a_wrong_override_is_named_as_it_was_written(good, override):
+    with pytest.raises(InputError) as caught:
+        load(good, [override])
+    assert all(str(p).startswith(f"--set {override}: ") for p in caught.value.problems)
+
+
+def test_an_override_mends_what_the_file_has_wrong(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text("name: x\nroad: {track: nowhere}\ndriver: {style: wild}\n")
+    scenario = load(path, ["road={track: rural}", "driver.style=normal"])
+    assert scenario.road.track == "rural"
+
+
+def test_names_with_dots_stay_whole_below_the_vehicle(good):
+    assert split_key("vehicle.parameters.Body.Mass") == ("vehicle", "parameters", "Body.Mass")
+    assert split_key("vehicle.variables.Car.ax.name") == ("vehicle", "variables", "Car.ax", "name")
+    assert split_key("controllers.0.kind") == ("controllers", 0, "kind")
+    assert load(good, ["vehicle.parameters.Body.Mass=2500"]).vehicle.parameters == {
+        "Body.Mass": 2500.0
+    }
+
+
+def test_later_checks_can_report_places(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text(GOOD + "vehicle:\n  parameters: {Body.Mas: 2500}\n")
+    scenario = load(path)
+    key = ("vehicle", "parameters", "Body.Mas")
+    place = scenario.locate(key)
+    assert (place.line, place.column) == (7, 26)
+    assert place.source == "  parameters: {Body.Mas: 2500}"
+    problem = scenario.problem(key, "no such parameter", ["Body.Mass", "Car.ax"])
+    assert str(problem) == (
+        f"{path}:7:16: no such parameter; did you mean 'Body.Mass'?\n"
+        "     7 |   parameters: {Body.Mas: 2500}\n"
+        "       |                ^^^^^^^^"
+    )
+    changed = load(path, ["vehicle.parameters.Body.Mas=1"]).locate(key)
+    assert str(changed) == "--set vehicle.parameters.Body.Mas=1"
+
+
+def test_paths_start_at_the_scenario_file(tmp_path):
+    (tmp_path / "roads").mkdir()
+    (tmp_path / "roads" / "my.crg").touch()
+    path = tmp_path / "a.yaml"
+    path.write_text("name: x\nroad: {file: roads/my.crg}\n")
+    scenario = load(path)
+    assert scenario.resolve(scenario.road.file) == tmp_path / "roads" / "my.crg"
+
+
+def test_a_missing_file_names_its_neighbour(tmp_path):
+    (tmp_path / "my.crg").touch()
+    found = problems(tmp_path, "name: x\nroad: {file: mi.crg}\n")
+    assert "did you mean 'my.crg'?" in found[0][2]
+
+
+@pytest.mark.parametrize("name", ["gone.yaml", "folder", "latin.yaml"])
+def test_files_that_cannot_be_read(tmp_path, name):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "latin.yaml").write_bytes(b"name: \xe9\n")
+    with pytest.raises(InputError, match=r"no such scenario file|is a folder|is not UTF-8"):
+        load(tmp_path / name)
+
+
+def test_the_committed_json_schema_is_current():
+    assert json.loads((SCENARIOS / "schema.json").read_text()) == json_schema()
+
+
+def test_scenarios_exist():
+    assert len(list((SCENARIOS / "laps").glob("*.yaml"))) == 18
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_every_scenario_loads_and_agrees_with_the_json_schema(path):
+    load(path)
+    first = path.read_text().splitlines()[0]
+    prefix = "# yaml-language-server: $schema="
+    assert first.startswith(prefix)
+    schema = (path.parent / first.removeprefix(prefix)).resolve()
+    assert schema == SCENARIOS / "schema.json"
+    jsonschema.validate(YAML(typ="safe").load(path), json.loads(schema.read_text()))
+
+
+@pytest.mark.parametrize("path", FILES[:3], ids=lambda path: path.stem)
+def test_the_resolved_scenario_is_the_same_scenario(path, tmp_path):
+    scenario = load(path, ["driver.speed_kmh=80"])
+    copy = tmp_path / "copy.yaml"
+    copy.write_text(resolved_yaml(scenario))
+    assert load(copy).model_dump() == scenario.model_dump()

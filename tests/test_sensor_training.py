@@ -1,0 +1,148 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sensor.dataset import Run, write_run
+from sensor.errors import SensorError
+from sensor.metrics import evaluate
+from sensor.model_card import figure_row, main, model_card
+from sensor.recipe import RECIPES, Recipe, TrainingRecipe, read_recipe
+from sensor.runtime import OnnxSensor
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("pyarrow")
+pytest.importorskip("onnx")
+
+from sensor import train as train_module  # noqa: E402
+from sensor.training import fit, learning_rate, train  # noqa: E402
+
+
+def linear_run(name: str, seed: int) -> Run:
+    """A truth that is a moving average of some channels, with noise."""
+    rng = np.random.default_rng(seed)
+    channels = rng.normal(size=(600, 14)) * np.logspace(-1, 1, 14) + 1.0
+    kernel = np.ones(3) / 3.0
+    mixed = channels[:, :4] / np.logspace(-1, 1, 14)[:4]
+    truth = 0.1 * np.stack([np.convolve(c, kernel)[:600] for c in mixed.T], axis=1)
+    truth += rng.normal(scale=0.002, size=truth.shape)
+    return Run(name, channels.astype(np.float32), truth.astype(np.float32))
+
+
+def make_recipe(**training: Any) -> Recipe:
+    settings = {"epochs": 4, "batch_size": 64, "windows_per_epoch": 512, "validation_windows": 256}
+    content = {
+        "name": "small",
+        "network": {"window": 5, "units": 12, "hidden": 16, "dropout": 0.1},
+        "training": settings | {"learning_rate": 5e-3} | training,
+        "runs": {"training": ["a", "b"], "validation": ["c"]},
+    }
+    return Recipe.model_validate(content)
+
+
+TRAINING, VALIDATION = [linear_run("a", 1), linear_run("b", 2)], [linear_run("c", 3)]
+
+
+@pytest.mark.parametrize("precision", ["fp32", "bf16"])
+def test_training_reduces_the_error(tmp_path: Path, precision: str) -> None:
+    recipe = make_recipe(epochs=8, windows_per_epoch=None, precision=precision)
+    network, record = fit(recipe, TRAINING, VALIDATION, tmp_path, resume=False)
+    errors = [epoch["validation_rmse"] for epoch in record["epochs"]]
+    assert errors[-1] < 0.6 * errors[0]
+    assert record["best_validation_rmse"] == min(errors)
+    assert record["best_epoch"] == errors.index(min(errors)) + 1
+    assert not network.training
+
+
+def test_resumed_training_ends_in_the_same_weights(tmp_path: Path) -> None:
+    whole, _ = fit(make_recipe(epochs=4), TRAINING, VALIDATION, tmp_path, resume=False)
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    fit(make_recipe(epochs=2), TRAINING, VALIDATION, parts, resume=False)
+    torch.manual_seed(99)
+    resumed, record = fit(make_recipe(epochs=4), TRAINING, VALIDATION, parts, resume=True)
+    assert [epoch["epoch"] for epoch in record["epochs"]] == [1, 2, 3, 4]
+    for name, value in whole.state_dict().items():
+        assert torch.equal(value, resumed.state_dict()[name]), name
+    with pytest.raises(SensorError, match="another recipe"):
+        fit(make_recipe(batch_size=32), TRAINING, VALIDATION, parts, resume=True)
+    with pytest.raises(SensorError, match="no checkpoint"):
+        fit(make_recipe(), TRAINING, VALIDATION, tmp_path / "none", resume=True)
+
+
+def test_train_writes_network_and_record(tmp_path: Path) -> None:
+    for run in (*TRAINING, *VALIDATION):
+        write_run(tmp_path / f"{run.name}.parquet", run)
+    recipe = tmp_path / "recipe.yaml"
+    recipe.write_text(make_recipe(epochs=1).model_dump_json())  # JSON is YAML
+    out = tmp_path / "out"
+    network = train(tmp_path, recipe, out)
+    onnx_sensor = OnnxSensor(out / "bilstm_w5.onnx")
+    record = json.loads((out / "training.json").read_text())
+    assert onnx_sensor.info.metadata["training"] == record
+    assert record["samples"] == {"training": {"a": 600, "b": 600}, "validation": {"c": 600}}
+    channels = VALIDATION[0].channels
+    with torch.no_grad():
+        expected = network(torch.from_numpy(channels[:5])[None]).numpy()[0]
+    estimate = onnx_sensor.apply(channels.astype(np.float64))
+    np.testing.assert_allclose(estimate[4], expected, rtol=0.0, atol=1e-5)
+
+    figures = evaluate(estimate, VALIDATION[0].truth.astype(np.float64))
+    rows = [figure_row("Slalom 18 m at 15 km/h", "smooth", {"network": figures})]
+    (out / "figures.json").write_text(json.dumps(rows))
+    arguments = ["--model", str(out / "bilstm_w5.onnx"), "--training", str(out / "training.json")]
+    result = CliRunner().invoke(main, [*arguments, "--figures", str(out / "figures.json")])
+    assert result.exit_code == 0, result.output
+    card = (out / "bilstm_w5.md").read_text()
+    assert card == model_card("bilstm_w5", record, rows)
+    for part in ("Slalom 18 m at 15 km/h", "1.4; 96.2", "## Limits", "| seed | 1 |", "torch"):
+        assert part in card
+
+
+def test_command_reports_every_problem_and_exits_with_2(tmp_path: Path) -> None:
+    recipe = tmp_path / "recipe.yaml"
+    recipe.write_text("name: x\nseed: -1\nruns: {training: [a], validation: [b]}\nextra: 1\n")
+    arguments = ["--data", str(tmp_path), "--recipe", str(recipe), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(train_module.main, arguments)
+    assert result.exit_code == 2
+    assert "seed" in result.output
+    assert "extra" in result.output
+    recipe.write_text("name: x\nruns: {training: [a], validation: [b]}\n")
+    result = CliRunner().invoke(train_module.main, arguments)
+    assert result.exit_code == 2
+    assert "'a' matches no Parquet file" in result.output
+
+
+def test_the_papers_recipe() -> None:
+    recipe = read_recipe(RECIPES / "paper.yaml")
+    assert recipe.network.model_dump() == {
+        "window": 19, "units": 167, "hidden": 256, "dropout": 0.5,
+    }  # fmt: skip
+    assert (recipe.training.epochs, recipe.training.learning_rate) == (30, 1e-3)
+    assert recipe.training.schedule == "constant"
+    assert all(pattern.startswith("hockenheim") for pattern in recipe.runs.validation)
+    assert not any("hockenheim" in pattern for pattern in recipe.runs.training)
+
+
+def test_unreadable_recipes_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(SensorError, match="cannot be read"):
+        read_recipe(tmp_path / "none.yaml")
+    (tmp_path / "twice.yaml").write_text("name: x\nname: y\n")
+    with pytest.raises(SensorError, match="valid YAML"):
+        read_recipe(tmp_path / "twice.yaml")
+
+
+def test_learning_rate_schedules() -> None:
+    def rates(schedule: str) -> list[float]:
+        settings = TrainingRecipe.model_validate({"epochs": 30, "schedule": schedule})
+        return [learning_rate(settings, epoch) for epoch in range(30)]
+
+    assert set(rates("constant")) == {1e-3}
+    assert rates("step")[19:21] == pytest.approx([1e-3, 1e-4])
+    cosine = rates("cosine")
+    assert cosine[0] == 1e-3
+    assert cosine == sorted(cosine, reverse=True)
+    assert 0.0 < cosine[-1] < 1e-5
