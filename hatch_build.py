@@ -20,7 +20,7 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
         result = subprocess.run(command, check=False)
         if result.returncode != 0:
             raise SystemExit(result.returncode)  # the build has said why
-        build_data["artifacts"] += ["/cosim/fmus/*.fmu"]
+        build_data["artifacts"] += ["/cosim/fmus/*.fmu", "/cosim/fmus/*.so"]
         build_data["pure_python"] = False
         platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
         build_data["tag"] = f"py3-none-{platform}"

@@ -81,6 +81,25 @@ def run(
     sys.exit(outcome.exit_code)
 
 
+@main.command()
+@click.argument("recipe", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    metavar="DIR",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Where the Parquet files go, one per run; runs that are there already are kept.",
+)
+@click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
+def dataset(recipe: Path, out: Path, workers: int) -> None:
+    """Drive the runs of RECIPE, a YAML file, and write them as data for training."""
+    with _failures_as_exit_codes():
+        from cosim.dataset import drive_all
+
+        count = drive_all(recipe, out, workers, lambda stem: click.echo(stem, err=True))
+        click.echo(f"{count} runs in {out}", err=True)
+
+
 @contextmanager
 def _failures_as_exit_codes() -> Iterator[None]:
     try:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import InputError
-from cosim.road import Bumps, Iso8608, RoadError, Smooth, Surface, Track, build_road, load_track
+from cosim.road import Bumps, Iso8608, RoadError, Smooth, Surface, Track, build_road, load_track, track_of_file
 from cosim.scenario.schema import BumpSurface, IsoSurface, Scenario
 
 
@@ -26,8 +26,6 @@ def course_of(scenario: Scenario, cache_dir: Path | None = None) -> Course:
     road = scenario.road
     try:
         if road.file is not None:
-            from cosim.road import track_of_file
-
             file = scenario.resolve(road.file).resolve()
             return Course(track_of_file(file), file)
         track = load_track(str(road.track), road.length_m)

@@ -36,6 +36,7 @@ SANITIZE = [
     *["-std=c11", "-O1", "-g", "-ffp-contract=off", "-fno-omit-frame-pointer", "-Wall", "-Wextra"],
     *["-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
 ]
+ROAD_READER = "road_crg.so"
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 NO_COMPILER = (
     "No C compiler was found: install one (Debian and Ubuntu: 'apt install gcc libc6-dev',"
@@ -234,6 +235,24 @@ def build(
     return paths
 
 
+def build_road_reader(out: Path, cc: str | None = None, cflags: str = "") -> Path:
+    """The vehicle's OpenCRG reader as a shared library of its own, so that the driver reads a user's road
+    with the very code that the wheels run on; returns its path. Raises BuildError.
+    """
+    model = FMU_DIRECTORY / "vehicle"
+    sources = {path.name: path.read_bytes() for path in sorted(model.glob("road_crg*.[ch]"))}
+    flags = [flag for flag in FLAGS if flag != "-fvisibility=hidden"]
+    command = [*compiler(cc), *flags, *shlex.split(cflags), "-shared", *c_files(sources)]
+    out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as name:
+        for file, content in sources.items():
+            Path(name, file).write_bytes(content)
+        run_compiler([*command, "-lm", "-o", ROAD_READER], Path(name))
+        part = out / f".{ROAD_READER}.part"
+        part.write_bytes(Path(name, ROAD_READER).read_bytes())
+    return part.replace(out / ROAD_READER)
+
+
 def sanitize(model: Path, out: Path, cc: str | None = None, cflags: str = "") -> list[Path]:
     """Programs of ``smoke.c`` and the model with the address and undefined-behaviour sanitizers."""
     table = read_table(model / "variables.toml")
@@ -285,6 +304,8 @@ def main(argv: list[str] | None = None) -> int:
         if not options.sanitize:
             for path in build(model, options.out, options.cc, options.cflags, options.platform):
                 print(path)
+            if model.name == "vehicle":
+                print(build_road_reader(options.out, options.cc, options.cflags))
             return 0
         with tempfile.TemporaryDirectory() as folder:
             programs = sanitize(model, Path(folder), options.cc, options.cflags)

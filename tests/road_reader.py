@@ -1,4 +1,4 @@
-"""The vehicle's OpenCRG reader as a shared library, and OpenCRG files made by hand for its tests."""
+"""The vehicle's OpenCRG reader as a shared library, and OpenCRG files made by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Road files: written, cached, and read back by three OpenCRG readers (cosim.road.crg, cosim.road.build)."""
+"""Road files: written, cached, read back by three OpenCRG readers (cosim.road.crg, .build)."""
 
 from __future__ import annotations
 

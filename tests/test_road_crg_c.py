@@ -245,7 +245,8 @@ def test_what_is_wrong_is_said_in_one_sentence(
         Reader.open(library, spoilt(tmp_path, old, new))
     message = str(caught.value)
     assert message.startswith(str(tmp_path / "road.crg"))
-    assert message.endswith((".", "?")) and "\n" not in message
+    assert message.endswith((".", "?"))
+    assert "\n" not in message
 
 
 @pytest.mark.parametrize("form", ["LDFI", "KRBI"])
@@ -253,7 +254,7 @@ def test_a_cut_file_is_refused(library: ctypes.CDLL, tmp_path: Path, form: str) 
     path = winding_road(form=form).write(tmp_path / "road.crg")
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) * 3 // 4])
-    with pytest.raises(ValueError, match="cut short|line ends before"):
+    with pytest.raises(ValueError, match=r"cut short|line ends before"):
         Reader.open(library, path)
 
 

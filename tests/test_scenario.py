@@ -14,7 +14,7 @@ from cosim.scenario.overrides import split_key
 from cosim.scenario.schema import json_schema
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
-FILES = sorted(SCENARIOS.rglob("*.yaml"))
+FILES = sorted(path for path in SCENARIOS.rglob("*.yaml") if path.parent.name != "datasets")
 GOOD = """\
 name: a scenario
 road:

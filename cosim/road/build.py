@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 from pathlib import Path
+from uuid import uuid4
 
 from cosim.road.crg import WRITER_VERSION, write_crg
 from cosim.road.errors import RoadError
@@ -34,14 +34,12 @@ def build_road(track: Track, surface: Surface, cache_dir: Path | None = None) ->
     grid = surface.elevation(track.s, v)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=directory, prefix=".", suffix=".crg")
-        os.close(handle)
+        unfinished = directory / f".{path.stem}-{uuid4().hex}.crg"
         try:
-            write_crg(Path(name), track, v, grid)
-            Path(name).replace(path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
+            write_crg(unfinished, track, v, grid)
+            unfinished.replace(path)
+        finally:
+            unfinished.unlink(missing_ok=True)
     except OSError as error:
         raise RoadError(
             f"the road cannot be kept in {directory} ({error.strerror}); "

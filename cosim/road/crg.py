@@ -20,7 +20,7 @@ _BLOCK = 80  # binary data is filled up to whole blocks of so many bytes
 def write_crg(
     path: Path, track: Track, v: npt.NDArray[np.float64], grid: npt.NDArray[np.float32]
 ) -> None:
-    """Write a track with the elevation `grid` [m], shape (len(track.s), len(v)), over columns `v` [m].
+    """Write a track with the elevation `grid` [m], shape (len(track.s), len(v)), at columns `v`.
 
     u of the file is s of the track; x, y and z stay the track's own (an empty $ROAD_CRG_MODS keeps
     readers from moving the start to the origin). Heading and slope are those of the chords from one

@@ -64,15 +64,16 @@ def parse_layout(text: str) -> tuple[Element, ...]:
 
 
 def _parse_word(word: str) -> Element:
-    kind, _, rest = word[:1], word[:0], word[1:]
+    kind, numbers = word[:1], word[1:].split("/")
     try:
-        if kind == "S":
-            return Straight(float(rest))
-        if kind in ("L", "R"):
-            radius, angle = rest.split("/")
-            return Arc(float(radius), float(angle), left=kind == "L")
+        values = [float(number) for number in numbers]
     except ValueError:
-        pass
+        values = []
+    if all(0.0 < value < math.inf for value in values):
+        if kind == "S" and len(values) == 1:
+            return Straight(values[0])
+        if kind in ("L", "R") and len(values) == 2:
+            return Arc(values[0], values[1], left=kind == "L")
     raise RoadError(f"'{word}' is no road element; write S200, L150/35 or R68/69 (m, m/deg)")
 
 
@@ -120,7 +121,7 @@ def gauss_points(s: Floats) -> Floats:
 def close_circuit(
     elements: Sequence[Element], transition: float, adjustable: tuple[int, int]
 ) -> tuple[Element, ...]:
-    """Return the elements, the two straights at `adjustable` changed so that the end meets the start.
+    """Return the elements, the straights at `adjustable` changed so that end and start meet.
 
     Raises `RoadError` if the arcs do not turn by a whole circle, or a straight would vanish.
     """

@@ -35,7 +35,7 @@ _COHERENCE = {"A": (8.5, 3.5), "B": (5.3, 2.2), "C": (3.0, 1.3), "D": (1.6, 0.8)
 # The road is even up to the first and fully rough from the second on [m]
 _FADE_START, _FADE_END = 3.0, 13.0
 _QUANTUM = 2.0**-20  # elevations are multiples of it [m]: the same on every machine
-_FREQUENCIES_AT_ONCE = 4096
+_CORRELATIONS_AT_ONCE = 2_000_000  # of all frequencies and pairs of columns: 16 MB
 
 
 class Surface(Protocol):
@@ -58,7 +58,7 @@ class Smooth:
 
     label: ClassVar[str] = "smooth"
 
-    def columns(self, s: Floats) -> Floats:
+    def columns(self, s: Floats) -> Floats:  # noqa: ARG002 - the same for every road
         """Return the two edges [m]."""
         return np.array([-HALF_WIDTH, HALF_WIDTH])
 
@@ -94,17 +94,19 @@ class Iso8608:
 
     def columns(self, s: Floats) -> Floats:
         """Return columns 0.1 m apart [m], on a long road only where the wheels run."""
-        return _DENSE_COLUMNS if len(s) * len(_DENSE_COLUMNS) <= _MOST_CELLS else _WHEEL_COLUMNS
+        short = len(s) * len(_DENSE_COLUMNS) <= _MOST_CELLS
+        return np.array(_DENSE_COLUMNS if short else _WHEEL_COLUMNS, dtype=np.float64)
 
     def elevation(self, s: Floats, v: Floats) -> npt.NDArray[np.float32]:
-        """Return the field [m], faded in over the first metres behind s = 0, shape (len(s), len(v))."""
+        """Return the field [m], faded in behind s = 0, shape (len(s), len(v))."""
         count, ds = _fast_length(len(s)), float(s[1] - s[0])
         spectrum = np.zeros((count // 2 + 1, len(v)), dtype=np.complex128)
         frequency = np.arange(count // 2 + 1) / (count * ds)
         (used,) = np.nonzero((frequency >= LOWEST_FREQUENCY) & (frequency < HIGHEST_FREQUENCY))
         random = np.random.default_rng(self.seed)
-        for first in range(0, len(used), _FREQUENCIES_AT_ONCE):
-            rows = used[first : first + _FREQUENCIES_AT_ONCE]
+        at_once = max(1, _CORRELATIONS_AT_ONCE // len(v) ** 2)
+        for first in range(0, len(used), at_once):
+            rows = used[first : first + at_once]
             spectrum[rows] = self._amplitudes(random, frequency[rows], v, ds)
         # a bin holds Gd dn; irfft divides by the count
         spectrum *= count * np.sqrt(0.25 / (count * ds))
@@ -112,7 +114,7 @@ class Iso8608:
         return np.asarray(np.round(field / _QUANTUM) * _QUANTUM, dtype=np.float32)
 
     def coherence(self, frequency: Floats, distance: Floats) -> Floats:
-        """Return gamma of two lines `distance` [m] apart at `frequency` [cycles/m], broadcast together."""
+        """Return gamma of lines `distance` [m] apart at `frequency` [cycles/m], broadcast."""
         corner, power = _COHERENCE[self.road_class]
         turn = 2.0 * np.pi * frequency * distance / corner
         return np.asarray((1.0 + turn * turn) ** -power)
@@ -132,12 +134,13 @@ class Iso8608:
         coherence = self.coherence(n, np.abs(v[:, None] - v))
         coherence += 1e-9 * np.eye(len(v))  # long waves: columns all but equal
         factor = np.linalg.cholesky(coherence)
-        white = random.standard_normal((len(frequency), len(v), 2)) @ np.array([1.0, 1.0j])
+        white = random.standard_normal((len(frequency), len(v), 2))  # real and imaginary parts
         roughness = ROUGHNESS[self.road_class] * (frequency / REFERENCE_FREQUENCY) ** -2.0
         along = 2.0 / 3.0 + np.cos(2.0 * np.pi * frequency * ds) / 3.0
         across = 2.0 / 3.0 + self.coherence(frequency, np.asarray(np.diff(v).min())) / 3.0
         scale = np.sqrt(roughness / (along * across))
-        return np.asarray((factor @ white[:, :, None])[:, :, 0] * scale[:, None])
+        mixed = (factor @ white) @ np.array([1.0, 1.0j])
+        return np.asarray(mixed * scale[:, None])
 
 
 @dataclass(frozen=True)
@@ -155,18 +158,23 @@ class Bumps:
     _first: ClassVar[float] = 15.0  # start of the first bump [m]
     _inner: ClassVar[float] = 0.3  # nearer to the middle a bump falls off to nothing [m]
 
-                def __post_init__(self) -> None: for name in ("height", "length", "spacing"): if not
-                getattr(self, name) > 0.0: value = getattr(self, name) raise RoadError(f"the bumps'
-                {name} is {value:g} m; it must be positive") if self.spacing < self.length: raise
-                RoadError( f"the bumps' spacing of {self.spacing:g} m is less than their length of
-                {self.length:g} m" )
+    def __post_init__(self) -> None:
+        for name in ("height", "length", "spacing"):
+            if not getattr(self, name) > 0.0:
+                value = getattr(self, name)
+                raise RoadError(f"the bumps' {name} is {value:g} m; it must be positive")
+        if self.spacing < self.length:
+            raise RoadError(
+                f"the bumps' spacing of {self.spacing:g} m is less than "
+                f"their length of {self.length:g} m"
+            )
 
     @property
     def label(self) -> str:
         """For example bumps-0.03x0.5x4."""
         return f"bumps-{self.height:g}x{self.length:g}x{self.spacing:g}"
 
-    def columns(self, s: Floats) -> Floats:
+    def columns(self, s: Floats) -> Floats:  # noqa: ARG002 - the same for every road
         """Return the edges, the middle and the bumps' inner ends [m]."""
         return np.array([-HALF_WIDTH, -self._inner, 0.0, self._inner, HALF_WIDTH])
 
@@ -197,7 +205,7 @@ def _fade_in(s: Floats) -> Floats:
 
 
 def _fast_length(count: int) -> int:
-    """Return the next even length not below `count` with no prime factor above 5: fast to transform."""
+    """Return the next even length with no prime factor above 5, which is fast to transform."""
     length = count + count % 2
     while True:
         rest = length

@@ -1,9 +1,9 @@
-"""A track: the line that a road follows, its grade and banking, and what a driver has to obey on it."""
+"""A track: the line that a road follows, its grade and banking, its limits and stops."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -43,7 +43,7 @@ class Pose(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The reference line on a uniform grid of s, from the lead-in (s < 0) to the run-out (s > length).
+    """The reference line on a uniform grid of s, from the lead-in (s < 0) to the run-out.
 
     All arrays have shape (n,). x, y, z in m (ISO 8855: z up), `heading` in rad counter-clockwise
     and continuous, `curvature` in 1/m positive to the left, `grade` = dz/ds, `banking` the cross
@@ -74,7 +74,7 @@ class Track:
         return self.x, self.y, self.z, self.heading, self.curvature, self.grade, self.banking
 
     def pose(self, s: float) -> Pose:
-        """Return the line at `s` [m], linear between the grid's points; the first or last beyond them."""
+        """Return the line at `s` [m], linear between the grid's points, kept beyond its ends."""
         place = min(max((s - self.s[0]) / DS, 0.0), len(self.s) - 1.0)
         i = min(int(place), len(self.s) - 2)
         share = place - i
@@ -138,7 +138,7 @@ class Layout:
 
 
 def build_track(layout: Layout) -> Track:
-    """Return the track of a layout, its line integrated to round-off from the curvature's clothoids."""
+    """Return the track of a layout, its line integrated to round-off from the curvature."""
     length = sum(e.length for e in layout.elements)
     count = math.ceil((LEAD_IN + length + RUN_OUT) / DS) + 1
     s: Floats = np.asarray(-LEAD_IN + DS * np.arange(count), dtype=np.float64)
@@ -168,7 +168,7 @@ def build_track(layout: Layout) -> Track:
 
 
 def smooth_steps(knots: Knots) -> Callable[[Floats], Floats]:
-    """Return the function through (s, value) `knots` with zero slope at each of them, constant outside."""
+    """Return the function through (s, value) `knots`, level at each of them and outside."""
     places, values = np.array(knots).T
     if len(places) == 1:
         return lambda s: np.full_like(s, values[0])
@@ -183,7 +183,7 @@ def _wrapped(s: Floats, length: float) -> Floats:
 def _bends(
     layout: Layout, length: float
 ) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
-    """Return curvature(s) and heading(s), lap after lap for a circuit, straight on outside an open road."""
+    """Return curvature(s) and heading(s): lap after lap, or straight on outside an open road."""
     curvature: PPoly = curvature_profile(layout.elements, layout.transition)
     turned: PPoly = curvature.antiderivative()
     lap = float(turned(length))
@@ -213,8 +213,3 @@ def _integral(
     rise = (wrapped(s[:-1]) + 4.0 * wrapped(0.5 * (s[1:] + s[:-1])) + wrapped(s[1:])) * (DS / 6.0)
     z = np.concatenate(([0.0], np.cumsum(rise)))
     return np.asarray(z - z[round(LEAD_IN / DS)])
-
-
-def heading_change_deg(elements: Sequence[Element]) -> float:
-    """Return the layout's whole turn, positive to the left [deg]."""
-    return math.degrees(sum(e.curvature * e.length for e in elements))

@@ -92,7 +92,7 @@ def _hockenheim() -> Layout:
 
 
 def _rural() -> Layout:
-    """1.76 km of country road: three roundabouts, lane changes, turns of constant radius; 75 km/h."""
+    """Country road, 1.76 km: roundabouts, lane changes, turns of constant radius; 75 km/h."""
     elements = parse_layout(_RURAL)
     rest = _RURAL_LENGTH - sum(e.length for e in elements)
     return Layout(
@@ -149,7 +149,7 @@ def _hills(random: np.random.Generator, length: float, steepest: float) -> Knots
 
 
 def _superelevation(elements: tuple[Element, ...], slope: float) -> Knots:
-    """Return a banking of `slope` towards the inside of every arc, reached within 10 m of its ends."""
+    """Return a banking of `slope` towards the inside of every arc, reached around its ends."""
     ends = itertools.accumulate((e.length for e in elements), initial=0.0)
     knots: list[tuple[float, float]] = []
     for start, element in zip(ends, elements, strict=False):

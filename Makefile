@@ -1,0 +1,60 @@
+# Two commands set everything up on a fresh machine: `make demo` and `make test`. They need Python 3.11 or newer and
+# a C compiler; everything else goes into .venv.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+SCENARIO ?= scenarios/laps/hockenheim_normal_class_a.yaml
+DATA ?= data/paper
+SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
+
+.PHONY: demo test check fmu dataset train card figures benchmarks sanitize clean
+
+demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
+	$(BIN)/cosim run $(SCENARIO)
+
+test: $(VENV)/test.stamp ## linters, types, and all tests
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Python 3.11 or newer is needed: make PYTHON=python3.11")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+
+$(VENV)/demo.stamp: $(SOURCES) | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet -e '.[report]'
+	touch $@
+
+# torch goes first: its CPU build, where the machine offers one, must not be replaced by a larger build.
+$(VENV)/test.stamp: $(SOURCES) | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet torch==2.13.0
+	$(BIN)/python -m pip install --quiet -e '.[test]'
+	touch $@ $(VENV)/demo.stamp
+
+check: $(VENV)/test.stamp ## formatting
+	$(BIN)/ruff format --check .
+
+fmu: ## rebuild the FMUs after a change of the C sources
+	$(BIN)/python fmu/build.py
+
+sanitize: $(VENV)/test.stamp ## AddressSanitizer, UBSan and leak check over 50 lives of the vehicle FMU
+	$(BIN)/python fmu/build.py --sanitize
+
+dataset: $(VENV)/test.stamp ## the runs behind the published network (about three minutes)
+	$(BIN)/cosim dataset scenarios/datasets/paper.yaml --out $(DATA)
+
+train: dataset ## the published network and filter (about 20 minutes on 2 cores); resumes where it was stopped
+	$(BIN)/python -m sensor.baselines.fit --data $(DATA) --recipe sensor/recipes/paper.yaml --out sensor/models
+	$(BIN)/python -m sensor.train --data $(DATA) --recipe sensor/recipes/paper.yaml --out build/training --resume
+	cp build/training/bilstm_w19.onnx build/training/training.json sensor/models/
+
+figures: $(VENV)/test.stamp ## nine laps on two surfaces: docs/laps.md and the model card (about two minutes)
+	$(BIN)/python docs/measure_laps.py
+
+benchmarks: $(VENV)/test.stamp ## real-time factors and loop overhead, beside FMPy's simulate_fmu
+	$(BIN)/python tests/benchmarks/bench_loop.py
+	$(BIN)/python tests/benchmarks/bench_sensor.py
+
+clean:
+	rm -rf build dist results cosim/fmus
