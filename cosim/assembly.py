@@ -153,10 +153,7 @@ def _start_values(
     settings = scenario.vehicle
     if settings.fmu != "builtin":
         return dict(settings.parameters)
-    values = builtin_start(course, speed, passive)
-    if settings.step_s is not None:
-        values["Solver.Step"] = settings.step_s
-    return values | settings.parameters
+    return builtin_start(course, speed, passive) | settings.parameters
 
 
 def _network(scenario: Scenario) -> Path:

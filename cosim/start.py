@@ -12,8 +12,7 @@ from cosim.scenario.schema import Scenario
 # Set from the scenario's other fields; a second setting under parameters would contradict them.
 _TAKEN: Final = {
     "Road.File": "road", "Init.x": "road", "Init.y": "road", "Init.Yaw": "road",
-    "Init.Velocity": "driver.speed_kmh", "Solver.Step": "vehicle.step_s",
-    "Damp.Passive": "controllers",
+    "Init.Velocity": "driver.speed_kmh", "Damp.Passive": "controllers",
 }  # fmt: skip
 
 

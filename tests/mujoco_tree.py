@@ -69,7 +69,7 @@ def tree(p: dict[str, float]) -> Any:
     spec.option.gravity = [0.0, 0.0, -p["Env.Gravity"]]
     spec.compiler.degree = False
     sprung = spec.worldbody.add_body(
-        name="sprung", mass=body.mass, inertia=body.inertia, explicitinertial=True
+        name="sprung", mass=body.mass, inertia=body.inertia, ipos=np.zeros(3), explicitinertial=True
     )
     sprung.add_freejoint()
     mass, across = p["Body.UnsprungMass"] / 4, p["Wheel.CarrierInertiaX"]
@@ -77,7 +77,7 @@ def tree(p: dict[str, float]) -> Any:
     carrier_across = across - wheel_across
     for corner, hub in zip(CORNERS, hubs(p) - body.cog, strict=True):
         strut = sprung.add_body(  # at most six joints to a body: the kingpin's hinge is the next one's
-            pos=hub, mass=STRUT_MASS_SHARE * mass, inertia=[NO_INERTIA] * 3, explicitinertial=True
+            pos=hub, mass=STRUT_MASS_SHARE * mass, inertia=[NO_INERTIA] * 3, ipos=np.zeros(3), explicitinertial=True
         )
         for axis in np.eye(3):
             strut.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
@@ -87,7 +87,7 @@ def tree(p: dict[str, float]) -> Any:
             name=f"carrier{corner}",
             mass=(1 - STRUT_MASS_SHARE - WHEEL_MASS_SHARE) * mass,
             inertia=[carrier_across, p["Wheel.CarrierInertiaY"], carrier_across],
-            explicitinertial=True,
+            ipos=np.zeros(3), explicitinertial=True,
         )
         caster = p[f"Kin.Caster{corner}"]
         kingpin = [-math.sin(caster), 0.0, math.cos(caster)]
@@ -96,10 +96,14 @@ def tree(p: dict[str, float]) -> Any:
             name=f"wheel{corner}",
             mass=WHEEL_MASS_SHARE * mass,
             inertia=[wheel_across, J, wheel_across],
-            explicitinertial=True,
+            ipos=np.zeros(3), explicitinertial=True,
         )
         wheel.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
-    return spec.compile()
+    for joint in spec.joints:  # toe and kingpin may be parallel, which compiling would warn of
+        joint.armature = 1.0
+    model = spec.compile()
+    model.dof_armature[:] = 0.0
+    return model
 
 
 class Guided(NamedTuple):
@@ -187,6 +191,11 @@ class Oracle:
             J[joints.stop, 10 + i] = 1.0
         return J, free
 
+    def _update(self) -> None:
+        """Everything that follows from position and velocity, short of factorising M."""
+        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_crb, mujoco.mj_comVel):
+            stage(self.model, self.data)
+
     def _carrier_velocities(self, R: Array) -> tuple[Array, Array]:
         """Wheel-centre velocities and angular velocities of the carriers, body axes, (4, 3) each."""
         both = np.zeros((4, 6))
@@ -238,15 +247,16 @@ class Oracle:
         """
         model, data = self.model, self.data
         J, free = self._place(m)
-        mujoco.mj_forward(model, data)
+        self._update()
         R = data.body("sprung").xmat.reshape(3, 3).copy()
         axle = np.array([data.body(b).xmat.reshape(3, 3)[:, 1] for b in self._bodies("wheel")]) @ R
         v, rate = self._carrier_velocities(R)
         for i in range(4):
             data.qvel[self._columns(i).stop] = m["spin"][i] - axle[i] @ rate[i]
-        mujoco.mj_forward(model, data)
-        M = self._mass()
-        force = J.T @ (self._applied(m, R, brake) - data.qfrc_bias - M @ free)
+        self._update()
+        M, bias = self._mass(), np.zeros(model.nv)
+        mujoco.mj_rne(model, data, 0, bias)
+        force = J.T @ (self._applied(m, R, brake) - bias - M @ free)
         force[6:10] += m["spring_force"] + m["damper_force"]
         unknown = np.linalg.solve(J.T @ M @ J, force)
         return Answer(

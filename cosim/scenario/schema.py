@@ -169,7 +169,7 @@ Parameter = Annotated[bool | float | str, BeforeValidator(_check_parameter)]
 
 
 class Vehicle(Model):
-    """The vehicle FMU, its parameters and its step."""
+    """The vehicle FMU and its parameters."""
 
     fmu: str = Field(
         default="builtin",
@@ -181,13 +181,6 @@ class Vehicle(Model):
     )
     parameters: dict[str, Parameter] = Field(
         default_factory=dict, description="start values by the FMU's own names, in its units"
-    )
-    step_s: float | None = Field(
-        default=None,
-        gt=0,
-        le=0.01,
-        description="integrator step inside the FMU",
-        json_schema_extra=_with_unit("s"),
     )
     variables: dict[str, Variable] = Field(
         default_factory=dict, description="quantity to variable, for an FMU with other names"

@@ -5,7 +5,7 @@
  * (Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 10.1). */
 #include "vehicle.h"
 
-enum { PATCH_POINTS = 5 };
+enum { PATCH_POINTS = 4 };
 
 typedef struct { double height, slope_forward, slope_left; } Patch;
 
