@@ -50,10 +50,10 @@ train: dataset ## the published network and filter (about 20 minutes on 2 cores)
 	cp build/training/bilstm_w19.onnx build/training/training.json sensor/models/
 
 figures: $(VENV)/test.stamp ## nine laps on two surfaces: docs/laps.md and the model card (about two minutes)
-	$(BIN)/python docs/measure_laps.py
+	$(BIN)/python docs/measure/laps.py
 
 benchmarks: $(VENV)/test.stamp ## real-time factors and loop overhead, beside FMPy's simulate_fmu
-	$(BIN)/python tests/benchmarks/bench_loop.py
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/bench_loop.py
 	$(BIN)/python tests/benchmarks/bench_sensor.py
 
 clean:

@@ -12,7 +12,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
     """Runs ``fmu/build.py``; the wheel then belongs to a platform, but to every Python 3."""
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Build into ``cosim/fmus`` and add the result, although git ignores it."""
         if self.target_name != "wheel":
             return

@@ -14,13 +14,13 @@ import numpy as np
 from cosim import loop
 from cosim.comfort import ride_figures
 from cosim.controller import FixedDampers, Skyhook
+from cosim.course import Course, course_of
 from cosim.driver import PathDriver
 from cosim.errors import InputError, NetworkError
 from cosim.fmi import Description, Value
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, TRUTH, Quantity
 from cosim.recorder import Recorder, Signal
-from cosim.course import Course, course_of
 from cosim.scenario.schema import Passive, Scenario
 from cosim.scenario.schema import Skyhook as SkyhookSettings
 from cosim.speed_profile import STYLES, speed_profile, travel_time
@@ -36,7 +36,9 @@ LATE: Final = 1.3  # a driver this much slower than his profile has come to grie
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a run ended. `comfort` is empty where the vehicle lacks the signals; times in s, deviation in m."""
+    """How a run ended. `comfort` is empty where the vehicle lacks the signals; times in s,
+    deviation in m.
+    """
 
     steps_done: int
     wall_time_s: float
@@ -57,6 +59,7 @@ class Assembly:
     vehicle: Vehicle
     driver: PathDriver
     steps: int
+    if_late: str  # why the run ends where the driver has not reached the end of the road
 
     def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
         """Run to the end of the lap or the last step, and free the FMU whatever happens."""
@@ -66,13 +69,13 @@ class Assembly:
         finally:
             self.vehicle.close()
         wall = time.perf_counter() - begin
-        finished = self.driver.finished
+        reason = "end of the road" if self.driver.finished else self.if_late
         return RunResult(
             steps_done=last,
             wall_time_s=wall,
             simulated_s=last * STEP_S,
-            lap_time_s=last * STEP_S if finished else None,
-            finish_reason="end of the road" if finished else "duration reached",
+            lap_time_s=last * STEP_S if self.driver.finished else None,
+            finish_reason=reason,
             comfort=_comfort(self.recorder),
             largest_deviation_m=self.driver.largest_deviation,
         )
@@ -86,13 +89,13 @@ def assemble(
 ) -> Assembly:
     """Connect the blocks of `scenario` with one of its controllers.
 
-    `sensor` and `dampers` replace the scenario's own (the data set is built so). Raises `InputError`
-    with everything wrong in the scenario, `FmuError` or `NetworkError` for a file that does not load.
+    `sensor` and `dampers` replace the scenario's own (the data set is built so). Raises
+    `InputError` with everything wrong in the scenario, `FmuError` or `NetworkError` for a file that
+    does not load.
     """
-    wiring, description = _wired(scenario)
+    wiring, description, course = _checked(scenario)
     network = None if sensor is not None else _network(scenario)
-    block = sensor or _sensor(network)
-    course = course_of(scenario)
+    block = sensor or _sensor(_network(scenario))
     style = STYLES[scenario.driver.style]
     cap = scenario.driver.speed_kmh / 3.6 if scenario.driver.speed_kmh else None
     speed = speed_profile(course.track, style, cap)
@@ -111,6 +114,7 @@ def assemble(
         vehicle=vehicle,
         driver=driver,
         steps=steps,
+        if_late="lap not finished" if scenario.duration == "lap" else "duration reached",
     )
 
 
@@ -131,20 +135,36 @@ def record_groups() -> list[tuple[str, list[Signal]]]:
     ]
 
 
-def _wired(scenario: Scenario) -> tuple[Wiring, Description]:
-    """Return the vehicle FMU and its wiring, every name in the scenario checked."""
+def _checked(scenario: Scenario) -> tuple[Wiring, Description, Course]:
+    """Return the vehicle FMU, its wiring and the course, after all that can be wrong was looked
+    for.
+    """
     settings = scenario.vehicle
     own = settings.fmu == "builtin"
     description = Description(
         builtin_fmu(settings.fmi_version) if own else scenario.resolve(settings.fmu)
     )
     wiring, problems = (
-        (own_wiring(), []) if own else mapped_wiring(description, settings.variables, scenario.problem)
+        (own_wiring(), [])
+        if own
+        else mapped_wiring(description, settings.variables, scenario.problem)
     )
     problems += checked_parameters(scenario, description)
-    if problems:
+    course = None
+    try:
+        course = course_of(scenario)
+    except InputError as error:
+        problems += error.problems
+    if course is not None and scenario.driver.speed_kmh is None and _unlimited(course):
+        sentence = f"the {course.track.name} road has no speed limit: give driver.speed_kmh"
+        problems.append(scenario.problem(("driver", "speed_kmh"), sentence))
+    if problems or course is None:
         raise InputError(problems)
-    return wiring, description
+    return wiring, description, course
+
+
+def _unlimited(course: Course) -> bool:
+    return not bool(np.isfinite(course.track.speed_limit).all())
 
 
 def _start_values(
@@ -158,12 +178,15 @@ def _start_values(
 
 def _network(scenario: Scenario) -> Path:
     name = scenario.sensor.network
-    return default_model() if name == "default" else scenario.resolve(name)
-
-
-def _sensor(network: Path | None) -> OnnxSensor:
     try:
-        return OnnxSensor(network or default_model())
+        return default_model() if name == "default" else scenario.resolve(name)
+    except SensorError as error:
+        raise NetworkError(str(error)) from None
+
+
+def _sensor(network: Path) -> OnnxSensor:
+    try:
+        return OnnxSensor(network)
     except SensorError as error:
         raise NetworkError(str(error)) from None
 
@@ -171,9 +194,7 @@ def _sensor(network: Path | None) -> OnnxSensor:
 def _controller(settings: Passive | SkyhookSettings) -> ControllerBlock:
     if isinstance(settings, Passive):
         return FixedDampers()
-    return Skyhook(
-        settings.feedback == "truth", settings.gain_ns_per_m, settings.initial_command
-    )
+    return Skyhook(settings.feedback == "truth", settings.gain_ns_per_m, settings.initial_command)
 
 
 def _steps(scenario: Scenario, expected_s: float) -> int:

@@ -1,4 +1,6 @@
-"""Ride figures of a run: ISO 2631-1 weighted acceleration, suspension deflection, dynamic tyre load."""
+"""Ride figures of a run: ISO 2631-1 weighted acceleration, suspension deflection, dynamic tyre
+load.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ Array = npt.NDArray[np.float64]
 class Weighting:
     """Corner frequencies [Hz] and quality factors of a weighting, ISO 2631-1:1997 Table A.1.
 
-    Band limits f1, f2; acceleration-velocity transition f3, f4, q4; upward step f5, q5, f6, q6 (absent: None).
+    Band limits f1, f2; acceleration-velocity transition f3, f4, q4; upward step f5, q5, f6, q6
+    (absent: None).
     """
 
     f3: float
@@ -30,7 +33,7 @@ WK: Final = Weighting(12.5, 12.5, 0.63, (2.37, 0.91, 3.35, 0.91))  # vertical, s
 WD: Final = Weighting(2.0, 2.0, 0.63, None)  # horizontal, seated
 
 
-def weighting_gain(weighting: Weighting, frequency: Array) -> Array:
+def weighting_gain(weighting: Weighting, frequency: npt.ArrayLike) -> Array:
     """Return |H(f)| of a weighting, ISO 2631-1:1997 Annex A, equations A.1 to A.4."""
     p = 2j * np.pi * np.asarray(frequency, dtype=np.float64)
     w = weighting
@@ -44,14 +47,15 @@ def weighting_gain(weighting: Weighting, frequency: Array) -> Array:
         w5, w6 = 2 * np.pi * f5, 2 * np.pi * f6
         step = (1 + p / (q5 * w5) + (p / w5) ** 2) / (1 + p / (q6 * w6) + (p / w6) ** 2)
         gain = gain * step * (w5 / w6) ** 2
-    return np.abs(gain)
+    magnitude: Array = np.abs(gain)
+    return magnitude
 
 
 def weighted_rms(acceleration: Array, weighting: Weighting, rate_hz: float) -> float:
     """Return the frequency-weighted rms [m/s2] of a signal (n,), ISO 2631-1:1997 clause 6.4.2.
 
-    The weighting is applied to the one-sided spectrum: at 100 Hz its band limit lies above Nyquist, where a digital
-    filter would be off. The mean is removed first.
+    The weighting is applied to the one-sided spectrum: at 100 Hz its band limit lies above Nyquist,
+    where a digital filter would be off. The mean is removed first.
     """
     n = len(acceleration)
     spectrum = np.fft.rfft(acceleration - acceleration.mean())
@@ -62,11 +66,12 @@ def weighted_rms(acceleration: Array, weighting: Weighting, rate_hz: float) -> f
 
 
 def ride_figures(seat: Array, travel: Array, load: Array, rate_hz: float) -> dict[str, float]:
-    """Return the comfort figures from seat accelerations (n, 3) [m/s2], travels (n, 4) [m], loads (n, 4) [N].
+    """Return the comfort figures from seat accelerations (n, 3) [m/s2], travels (n, 4) [m], loads
+    (n, 4) [N].
 
-    weighted_acceleration_m_s2: vibration total value at the seat, clause 6.5 with k = 1 (comfort, clause 8.2);
-    deflection_rms_m and tyre_load_rms_n: rms about each wheel's mean, over all wheels. Empty with
-    less than two seconds of signal, or where the vehicle does not give them.
+    weighted_acceleration_m_s2: vibration total value at the seat, clause 6.5 with k = 1 (comfort,
+    clause 8.2); deflection_rms_m and tyre_load_rms_n: rms about each wheel's mean, over all wheels.
+    Empty with less than two seconds of signal, or where the vehicle does not give them.
     """
     if len(seat) < 2 * rate_hz or not np.isfinite(np.hstack([seat, travel, load])).all():
         return {}

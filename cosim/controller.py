@@ -15,10 +15,11 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DamperMap:
-    """Forces of the semi-active damper at the front wheel [N] over speed [m/s]: command 0 and command 1.
+    """Forces of the semi-active damper at the front wheel [N] over speed [m/s]: command 0 and
+    command 1.
 
-    The figures are the vehicle FMU's defaults (parameters Damp.Soft*, Damp.Hard*); linear between the points and
-    beyond the last. `scale` (4,) multiplies the force at FL FR RL RR.
+    The figures are the vehicle FMU's defaults (parameters Damp.Soft*, Damp.Hard*); linear between
+    the points and beyond the last. `scale` (4,) multiplies the force at FL FR RL RR.
     """
 
     speed: tuple[float, ...] = (0.0, 0.05, 0.1, 0.25, 0.5, 1.0)
@@ -68,10 +69,11 @@ SKYHOOK_GAIN: Final = 3500.0  # N s/m, the flat optimum of docs/closed-loop.md
 class Skyhook:
     """Continuous skyhook (Karnopp, Crosby & Harwood, J. Eng. Ind. 96, 1974) on a real damper's map.
 
-    The damper should pull the body with gain * v_body against the sky. It can only resist its own motion: where body
-    velocity (upward) and suspension velocity (extension) have one sign it is set to the force that comes nearest,
-    elsewhere to soft. v_body is estimated from the channels, v_rel is the truth or the sensor's estimate.
-    Until an estimate is valid the commands stay at `initial`.
+    The damper should pull the body with gain * v_body against the sky. It can only resist its own
+    motion: where body velocity (upward) and suspension velocity (extension) have one sign it is set
+    to the force that comes nearest, elsewhere to soft. v_body is estimated from the channels, v_rel
+    is the truth or the sensor's estimate. Until an estimate is valid the commands stay at
+    `initial`.
     """
 
     def __init__(
@@ -107,7 +109,9 @@ class Skyhook:
 
 
 def _tables(d: DamperMap) -> tuple[Array, Array, Array]:
-    """Return speed, soft and hard force from full compression to full rebound, ends extended to 5 m/s."""
+    """Return speed, soft and hard force from full compression to full rebound, ends extended to 5
+    m/s.
+    """
     far = 5.0
 
     def extended(values: tuple[float, ...]) -> list[float]:
@@ -119,4 +123,8 @@ def _tables(d: DamperMap) -> tuple[Array, Array, Array]:
 
     speed = (*d.speed, far)
     both = np.array([-v for v in speed[:0:-1]] + list(speed))
-    return both, joined(d.soft_compression, d.soft_rebound), joined(d.hard_compression, d.hard_rebound)
+    return (
+        both,
+        joined(d.soft_compression, d.soft_rebound),
+        joined(d.hard_compression, d.hard_rebound),
+    )

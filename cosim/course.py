@@ -1,4 +1,6 @@
-"""The course of a scenario: the track that the driver follows and the road file that the wheels run on."""
+"""The course of a scenario: the track that the driver follows and the road file that the wheels run
+on.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import InputError
-from cosim.road import Bumps, Iso8608, RoadError, Smooth, Surface, Track, build_road, load_track, track_of_file
+from cosim.road import (
+    Bumps,
+    Iso8608,
+    RoadError,
+    Smooth,
+    Surface,
+    Track,
+    build_road,
+    load_track,
+    track_of_file,
+)
 from cosim.scenario.schema import BumpSurface, IsoSurface, Scenario
 
 

@@ -23,7 +23,9 @@ class _Part(BaseModel):
 
 
 class Selection(_Part):
-    """Scenario files by a glob pattern relative to the recipe, each driven once per kind of dampers."""
+    """Scenario files by a glob pattern relative to the recipe, each driven once per kind of
+    dampers.
+    """
 
     scenarios: str = Field(min_length=1)
     dampers: tuple[Dampers, ...] = Field(min_length=1)
@@ -99,12 +101,13 @@ def drive(planned: PlannedRun, directory: Path) -> str:
     from cosim.assembly import STEP_S, assemble
     from cosim.controller import SwitchingDampers
     from cosim.scenario.load import load
+    from cosim.scenario.schema import Passive
     from sensor.dataset import Run, write_run
 
     scenario = load(planned.scenario, [f"seed={planned.seed}"])
     switching = planned.dampers == "switching"
     dampers = SwitchingDampers(planned.seed, STEP_S) if switching else None
-    assembly = assemble(scenario, scenario.controllers[0], NoSensor(), dampers)
+    assembly = assemble(scenario, Passive(kind="passive"), NoSensor(), dampers)
     result = assembly.run(None)
     if result.lap_time_s is None:
         raise InputError(f"{planned.scenario}: the lap was not finished, so it is no training run")
@@ -133,9 +136,10 @@ class NoSensor:
         return False
 
 
-
-def drive_all(recipe_file: Path, directory: Path, workers: int, progress: Callable[[str], None]) -> int:
-    """Drive a recipe's runs in spawned processes, one FMU instance each; return how many there are."""
+def drive_all(
+    recipe_file: Path, directory: Path, workers: int, progress: Callable[[str], None]
+) -> int:
+    """Drive a recipe's runs in spawned processes, one FMU each; return how many there are."""
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 

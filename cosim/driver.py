@@ -1,8 +1,9 @@
 """The driver block: follows the track's centre line by preview and a speed profile by pedals.
 
-Lateral: steady-state steer for the previewed curvature plus a correction of the deviation predicted a second
-ahead (single-point preview as in MacAdam, IEEE Trans. SMC 11, 1981). Longitudinal: the profile's own acceleration, the
-slope and the drag as feed-forward, and a proportional-integral correction of the speed.
+Lateral: steady-state steer for the previewed curvature plus a correction of the deviation predicted
+a second ahead (single-point preview as in MacAdam, IEEE Trans. SMC 11, 1981). Longitudinal: the
+profile's own acceleration, the slope and the drag as feed-forward, and a proportional-integral
+correction of the speed.
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from cosim.vehicle import State
 Array = npt.NDArray[np.float64]
 
 VX: Final = 6  # channel 7, Car.vx
+SPACING: Final = 0.5  # of the points at which the driver knows the road [m]
 
 
 @dataclass(frozen=True)
 class DriverModel:
     """What the driver knows of his car, and how he drives. SI units.
 
-    The understeer gradient and the rear axle's slip gradient are the steady-state figures of the package's
-    vehicle (docs/vehicle.md); another car only costs the feed-forward some accuracy.
+    The understeer gradient and the rear axle's slip gradient are the steady-state figures of the
+    package's vehicle (docs/vehicle.md); another car only costs the feed-forward some accuracy.
     """
 
     wheelbase: float = 2.675
@@ -67,18 +69,25 @@ class PathDriver:
         self.command = np.zeros(3)
         self._h = step_s
         self._length = track.length
-        self._first, self._spacing = float(track.s[0]), float(track.s[1] - track.s[0])
-        # Lists: one float at a time is what the loop needs, and a list hands it over fastest.
-        self._x, self._y = track.x.tolist(), track.y.tolist()
-        self._heading, self._curvature = track.heading.tolist(), track.curvature.tolist()
-        self._grade = track.grade.tolist()
-        self._speed = speed.tolist()
-        gain = np.gradient(speed * speed, track.s) / 2
-        self._acceleration = gain.tolist()
+        every = max(round(SPACING / float(track.s[1] - track.s[0])), 1)
+        self._first = float(track.s[0])
+        self._spacing = every * float(track.s[1] - track.s[0])
+
+        def points(values: Array) -> list[float]:
+            """A list hands over one float at a time fastest, and that is what the loop needs."""
+            picked: list[float] = values[::every].tolist()
+            return picked
+
+        self._x, self._y = points(track.x), points(track.y)
+        self._cosine, self._sine = points(np.cos(track.heading)), points(np.sin(track.heading))
+        self._heading, self._curvature = points(track.heading), points(track.curvature)
+        self._grade, self._speed = points(track.grade), points(speed)
+        self._acceleration = points(np.gradient(speed * speed, track.s) / 2)
         self._stops = [(s, round(wait / step_s)) for s, wait in track.stops]
         self._release = -1  # step at which a standing car may leave, -1 while driving
         self._index = round(-self._first / self._spacing)
         self._earliest = 0  # of the profile: behind a stop that is over, its braking counts no more
+        self._along = 0.0  # from the point at `_index` [m]
         self._integral = 0.0
         self._demand = 0.0
 
@@ -95,21 +104,24 @@ class PathDriver:
     def _locate(self, x: float, y: float) -> float:
         """Walk to the nearest point of the centre line; return its s and keep the deviation."""
         i, last = self._index, len(self._x) - 1
-        for _ in range(50):
+        half = 0.5 * self._spacing
+        for _ in range(last):
             dx, dy = x - self._x[i], y - self._y[i]
-            c, si = math.cos(self._heading[i]), math.sin(self._heading[i])
-            along, across = dx * c + dy * si, dy * c - dx * si
-            move = round(along / self._spacing / max(1 - self._curvature[i] * across, 0.2))
-            if move == 0 or not 0 <= i + move <= last:
+            along = dx * self._cosine[i] + dy * self._sine[i]
+            if along > half and i < last:
+                i += 1
+            elif along < -half and i > 0:
+                i -= 1
+            else:
                 break
-            i += move
-        self._index = i
-        self.deviation = across
-        self.largest_deviation = max(self.largest_deviation, abs(across))
+        self._index, self._along = i, along
+        self.deviation = dy * self._cosine[i] - dx * self._sine[i]
+        if abs(self.deviation) > self.largest_deviation:
+            self.largest_deviation = abs(self.deviation)
         return self._first + i * self._spacing + along
 
     def _at(self, values: list[float], distance: float) -> float:
-        i = max(self._index, self._earliest) + int(distance / self._spacing + 0.5)
+        i = max(self._index, self._earliest) + int((self._along + distance) / self._spacing + 0.5)
         return values[i if i < len(values) else -1]
 
     def _steer(self, v: float, yaw: float) -> float:
@@ -119,7 +131,8 @@ class PathDriver:
         # A car in a bend points off its course by its side slip: that is no heading error.
         here = self._curvature[self._index]
         side_slip = (m.cog_to_rear - m.rear_slip * v * v) * here
-        error = math.remainder(yaw + side_slip - self._heading[self._index], math.tau)
+        course = self._heading[self._index] + here * self._along
+        error = math.remainder(yaw + side_slip - course, math.tau)
         ahead = max(m.correction_distance, m.correction_time * v)
         predicted = self.deviation + ahead * math.sin(error)
         correction = -2 * (m.wheelbase + m.understeer * v * v) / (ahead * ahead) * predicted

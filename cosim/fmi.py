@@ -21,9 +21,8 @@ Array = npt.NDArray[np.float64]
 Value = bool | float | str
 
 _WARNING: Final = 1  # the largest status of both standards that lets a run go on
-_DISCARDED: Final = 2
 _STATUS: Final = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
-_KINDS: Final = {"Real": "Real", "Float64": "Real", "Boolean": "Boolean", "String": "String",
+KINDS: Final = {"Real": "Real", "Float64": "Real", "Boolean": "Boolean", "String": "String",
                  "Integer": "Integer", "Int32": "Integer"}  # fmt: skip
 
 
@@ -62,8 +61,8 @@ class Slave:
     """An instance of an FMU whose chosen real inputs and outputs are NumPy arrays.
 
     `inputs` (n_in,) is written by the caller before `step`; `outputs` (n_out,) is filled by `read`.
-    Both are in the FMU's own units and never move in memory. Every failing call raises `FmuError` with the
-    FMU's own words.
+    Both are in the FMU's own units and never move in memory. Every failing call raises `FmuError`
+    with the FMU's own words.
     """
 
     def __init__(
@@ -115,18 +114,24 @@ class Slave:
 
     def read(self) -> None:
         """Fill `outputs`."""
+        self.messages.clear()
         status = self._get(*self._get_arguments)
         if status > _WARNING:
             raise self._failure("read the outputs", status)
 
     def step(self, k: int, h: float) -> None:
         """Hold `inputs` over [k h, k h + h] and advance by h [s]."""
+        self.messages.clear()
         self._set_inputs()
         self._time.value = k * h
         self._step_size.value = h
         status = self._do_step(*self._step_arguments)
         if status > _WARNING:
             raise self._failure(f"step at t = {k * h:.6g} s", status)
+        if self._ended.value:
+            raise FmuError(
+                f"{self.description.path.name}: ended the simulation at t = {k * h + h:.6g} s"
+            )
 
     # ------------------------------------------------------------ below: FMI ceremony
 
@@ -172,6 +177,7 @@ class Slave:
         major = self.description.major
         component = ctypes.c_void_p(self._fmu.component)
         self._time, self._step_size = ctypes.c_double(), ctypes.c_double()
+        self._ended = ctypes.c_bool()  # FMI 3: terminateSimulation
         pointer, size, double, number = (
             ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double, ctypes.c_int,
         )  # fmt: skip
@@ -187,12 +193,12 @@ class Slave:
             )  # fmt: skip
         else:
             signature = [pointer, double, double, ctypes.c_bool] + [pointer] * 4
-            self._flags = (ctypes.c_bool * 3)()
+            self._event, self._early = ctypes.c_bool(), ctypes.c_bool()
             self._last_time = ctypes.c_double()
-            addresses = [ctypes.addressof(self._flags) + i for i in range(3)]
+            answers = (self._event, self._ended, self._early, self._last_time)
             self._step_arguments = (
                 component, self._time, self._step_size, ctypes.c_bool(True),
-                *(pointer(a) for a in addresses), pointer(ctypes.addressof(self._last_time)),
+                *(pointer(ctypes.addressof(answer)) for answer in answers),
             )  # fmt: skip
         self._do_step = self._function(f"fmi{major}DoStep", signature)
 
@@ -224,7 +230,7 @@ class Slave:
     def _set(self, name: str, value: Value) -> None:
         """Set a start value by the type that the FMU declares."""
         variable = self.description.variables[name]
-        kind = _KINDS.get(variable.type)
+        kind = KINDS.get(variable.type)
         names = {"Real": "Float64", "Integer": "Int32"} if self.description.major == 3 else {}
         if kind is None:
             raise FmuError(f"{name}: start values of type {variable.type} are not supported")
@@ -236,10 +242,11 @@ class Slave:
             raise self._failure(f"set {name} = {value!r}", error) from None
 
     def _failure(self, what: str, cause: Exception | int) -> FmuError:
-        words = self.messages[-1] if self.messages else ""
-        if not words and isinstance(cause, Exception):
+        if self.messages:
+            words = self.messages[-1]
+        elif isinstance(cause, Exception):
             words = _first_line(cause)
-        elif not words:
+        else:
             words = f"status {_STATUS[cause] if 0 <= cause < len(_STATUS) else cause}, no message"
         return FmuError(f"{self.description.path.name}: could not {what}: {words}")
 

@@ -1,7 +1,8 @@
-"""The co-simulation loop. Each line is one arrow of the data flow; row k of the record is everything at t_k = k h.
+"""The co-simulation loop. Each line is one arrow of the data flow; row k of the record is
+everything at t_k = k h.
 
-Driver and controller act on sample k and their commands are held over [t_k, t_k+1]: one sample of delay,
-the same for every vehicle FMU.
+Driver and controller act on sample k and their commands are held over [t_k, t_k+1]: one sample of
+delay, the same for every vehicle FMU.
 """
 
 from __future__ import annotations

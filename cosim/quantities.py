@@ -1,7 +1,7 @@
 """What the loop exchanges with a vehicle, by one name each, in SI units.
 
-The names are those of the vehicle FMU that comes with the package. Another FMU takes its place through a
-map from these quantities to its own variables (scenario field `vehicle.variables`).
+The names are those of the vehicle FMU that comes with the package. Another FMU takes its place
+through a map from these quantities to its own variables (scenario field `vehicle.variables`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ CORNERS: Final = ("FL", "FR", "RL", "RR")
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity, its SI unit, and where the package's own FMU has it (`scale` times `variable`)."""
+    """A quantity, its SI unit, and where the built-in FMU has it (`scale` times `variable`)."""
 
     name: str
     unit: str
@@ -47,8 +47,14 @@ POSE: Final = (
 )
 
 RIDE: Final = (
-    *(_own(f"Car.Seat.a{axis}", "m/s2", f"acceleration at the seat, {axis}", False) for axis in "xyz"),
-    *(_own(f"Car.C{c}.q0", "m", f"wheel travel {c}, positive in compression", False) for c in CORNERS),
+    *(
+        _own(f"Car.Seat.a{axis}", "m/s2", f"acceleration at the seat, {axis}", False)
+        for axis in "xyz"
+    ),
+    *(
+        _own(f"Car.C{c}.q0", "m", f"wheel travel {c}, positive in compression", False)
+        for c in CORNERS
+    ),
     *(_own(f"Car.Fz{c}", "N", f"vertical tyre force {c}", False) for c in CORNERS),
 )
 

@@ -64,6 +64,7 @@ class Recorder:
         for name, signals in groups:
             self._slices[name] = slice(start, start + len(signals))
             start += len(signals)
+        self._columns = tuple(self._slices.values())
 
     @property
     def rows(self) -> int:
@@ -84,11 +85,11 @@ class Recorder:
         """Copy one part per group into row `k`, which must be the next one."""
         if k != self._rows:
             raise ValueError(f"row {k} recorded after {self._rows} rows")
-        if len(parts) != len(self._slices):
-            raise ValueError(f"{len(parts)} parts recorded for {len(self._slices)} groups")
+        if len(parts) != len(self._columns):
+            raise ValueError(f"{len(parts)} parts recorded for {len(self._columns)} groups")
         row = self._data[k]
         row[0] = k * self.step_s
-        for columns, part in zip(self._slices.values(), parts, strict=True):
+        for columns, part in zip(self._columns, parts):  # noqa: B905 - checked above
             row[columns] = part
         self._rows = k + 1
 

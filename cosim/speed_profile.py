@@ -1,7 +1,8 @@
 """How fast a driver goes where: the g-g limit of a style over a track.
 
-Quasi-steady lap simulation by a forward and a backward pass (Brayshaw & Harrison, Proc. IMechE D 219, 2005): the
-curvature caps the speed, and what the lateral acceleration leaves of the g-g ellipse accelerates and brakes.
+Quasi-steady lap simulation by a forward and a backward pass (Brayshaw & Harrison, Proc. IMechE D
+219, 2005): the curvature caps the speed, and what the lateral acceleration leaves of the g-g
+ellipse accelerates and brakes.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ STYLES: Final = {
 def speed_profile(track: Track, style: Style, cap: float | None = None) -> Array:
     """Return the speed [m/s] at each point of `track.s` (n,); zero at the stops.
 
-    `cap` [m/s] lowers the track's own speed limits. The run-out after the lap is driven on, not braked for.
+    `cap` [m/s] lowers the track's own speed limits. The run-out after the lap is driven on, not
+    braked for.
     """
     curvature = np.abs(track.curvature)
     speed = np.sqrt(style.corner / np.maximum(curvature, 1e-6))
@@ -51,18 +53,19 @@ def speed_profile(track: Track, style: Style, cap: float | None = None) -> Array
 
 
 def _limited(speed: Array, curvature: Array, step: float, along: float, across: float) -> Array:
-    """One pass in the direction of the array: v dv/ds within the ellipse of `along` and `across`."""
+    """One pass along the array: v dv/ds within the ellipse of `along` and `across`."""
     squares = (speed * speed).tolist()
     for i, bend in enumerate(curvature[:-1].tolist()):
         used = min(squares[i] * bend / across, 1.0)
         reachable = squares[i] + 2 * step * along * (1 - used * used) ** 0.5
         if reachable < squares[i + 1]:
             squares[i + 1] = reachable
-    return np.sqrt(np.array(squares))
+    speeds: Array = np.sqrt(np.array(squares))
+    return speeds
 
 
 def travel_time(track: Track, speed: Array) -> float:
-    """Return the time [s] that the profile takes from s = 0 to the end of the lap, stops included."""
+    """Return the time [s] of the profile from s = 0 to the end of the lap, stops included."""
     lap = (track.s >= 0) & (track.s <= track.length)
     slowness = 1 / np.maximum(speed[lap], 0.7)
     waits = sum(stop[1] for stop in track.stops)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from cosim.errors import Problem
-from cosim.fmi import Description, Value
 from cosim.course import Course
+from cosim.errors import Problem
+from cosim.fmi import KINDS, Description, Value
+from cosim.quantities import INPUT_QUANTITIES
 from cosim.scenario.schema import Scenario
 
 # Set from the scenario's other fields; a second setting under parameters would contradict them.
@@ -17,7 +18,9 @@ _TAKEN: Final = {
 
 
 def builtin_start(course: Course, speed: float, passive: bool) -> dict[str, Value]:
-    """Return the start values that put the package's own vehicle at s = 0 of the road, rolling at `speed` [m/s]."""
+    """Return the start values that put the package's own vehicle at s = 0 of the road, rolling at
+    `speed` [m/s].
+    """
     pose = course.track.pose(0.0)
     return {
         "Init.x": pose.x,
@@ -30,11 +33,17 @@ def builtin_start(course: Course, speed: float, passive: bool) -> dict[str, Valu
 
 
 def checked_parameters(scenario: Scenario, description: Description) -> list[Problem]:
-    """Return what is wrong with `vehicle.parameters`: names, types, ranges, and settings made elsewhere."""
+    """Return what is wrong with `vehicle.parameters`: names, types, ranges, and settings made
+    elsewhere.
+    """
     own = scenario.vehicle.fmu == "builtin"
     parameters = {
-        name: v for name, v in description.variables.items() if v.causality in ("parameter", "input")
+        name: v
+        for name, v in description.variables.items()
+        if v.causality in ("parameter", "input")
     }
+    mapped = scenario.vehicle.variables
+    written = {mapped[q.name].name if q.name in mapped else q.variable for q in INPUT_QUANTITIES}
     problems = []
     for name, value in scenario.vehicle.parameters.items():
         key = ("vehicle", "parameters", name)
@@ -42,21 +51,29 @@ def checked_parameters(scenario: Scenario, description: Description) -> list[Pro
         if variable is None:
             sentence = f"'{description.path.name}' has no parameter '{name}'"
             problems.append(scenario.problem(key, sentence, tuple(parameters), name))
+        elif name in written:
+            sentence = f"'{name}' is written by the loop at every step; it is no parameter"
+            problems.append(scenario.problem(key, sentence))
         elif own and name in _TAKEN:
             problems.append(scenario.problem(key, f"'{name}' is set by {_TAKEN[name]}; use that"))
-        elif (sentence := _unfit(variable, value, description.unit_of(name))) is not None:
-            problems.append(scenario.problem(key, f"{name} {sentence}"))
+        elif (unfit := _unfit(variable, value, description.unit_of(name))) is not None:
+            problems.append(scenario.problem(key, f"{name} {unfit}"))
     return problems
 
 
 def _unfit(variable: object, value: Value, unit: str | None) -> str | None:
     """Say why a value does not fit a variable, or None."""
-    kind = getattr(variable, "type")  # noqa: B009 - FMPy's variables have no types for mypy
+    declared = str(getattr(variable, "type"))  # noqa: B009 - FMPy's variables have no types for mypy
+    kind = KINDS.get(declared)
+    if kind is None:
+        return f"is of type {declared}; only real, whole, Boolean and text parameters can be set"
     wants = {"Boolean": (bool, "true or false"), "String": (str, "text")}.get(kind)
     if wants is not None:
         return None if isinstance(value, wants[0]) else f"= {value!r} must be {wants[1]}"
     if isinstance(value, bool | str):
         return f"= {value!r} must be a number"
+    if kind == "Integer" and value != int(value):
+        return f"= {value:g} must be a whole number"
     low, high = getattr(variable, "min", None), getattr(variable, "max", None)
     shown = f" {unit}" if unit and unit != "1" else ""
     if low is not None and value < float(low):

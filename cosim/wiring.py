@@ -43,7 +43,11 @@ class Report(Protocol):
     """Makes a problem out of a place in the scenario and a sentence."""
 
     def __call__(
-        self, key: tuple[str | int, ...], message: str, choices: Sequence[str] = ..., name: str = ...
+        self,
+        key: tuple[str | int, ...],
+        message: str,
+        choices: Sequence[str] = ...,
+        name: str = ...,
     ) -> Problem:
         """Return the problem."""
 
@@ -84,7 +88,9 @@ def mapped_wiring(
     type, units that are undefined or of another dimension, and missing required quantities.
     """
     problems = [
-        report(("vehicle", "variables", name), f"unknown quantity '{name}'", tuple(QUANTITIES), name)
+        report(
+            ("vehicle", "variables", name), f"unknown quantity '{name}'", tuple(QUANTITIES), name
+        )
         for name in mapping
         if name not in QUANTITIES
     ]
@@ -101,7 +107,20 @@ def mapped_wiring(
 
     outputs = wires(OUTPUT_QUANTITIES, ("output", "local", "calculatedParameter"))
     inputs = wires(INPUT_QUANTITIES, ("input",))
+    problems += _doubled(inputs, report)
     return Wiring(outputs, inputs), problems
+
+
+def _doubled(inputs: Sequence[Wire], report: Report) -> list[Problem]:
+    """Return a problem for each input variable that two quantities would write."""
+    first: dict[str, str] = {}
+    problems = []
+    for wire in inputs:
+        other = first.setdefault(wire.variable, wire.quantity.name)
+        if other != wire.quantity.name:
+            sentence = f"'{wire.variable}' is mapped from both {other} and {wire.quantity.name}"
+            problems.append(report(("vehicle", "variables", wire.quantity.name, "name"), sentence))
+    return problems
 
 
 def _wire(
@@ -123,9 +142,13 @@ def _wire(
         sentence = f"'{description.path.name}' has no variable '{name}'"
         return report(key, sentence, tuple(description.variables), name)
     if variable.causality not in causality:
-        return report(key, f"'{name}' is {variable.causality}; {quantity.name} needs {causality[0]}")
+        return report(
+            key, f"'{name}' is {variable.causality}; {quantity.name} needs {causality[0]}"
+        )
     if variable.type not in ("Real", "Float64"):
-        return report(key, f"'{name}' is of type {variable.type}; {quantity.name} needs real numbers")
+        return report(
+            key, f"'{name}' is of type {variable.type}; {quantity.name} needs real numbers"
+        )
     return _converted(description, quantity, mapped, name, report)
 
 
@@ -141,31 +164,38 @@ def _converted(
     unit = stated or declared
     scale = mapped.scale if mapped is not None else quantity.scale
     key = ("vehicle", "variables", quantity.name, "unit")
+    if scale == 0:
+        return report((*key[:-1], "scale"), f"the scale of {quantity.name} must not be 0")
     if stated and declared and stated != declared:
         return report(key, f"the FMU declares '{name}' in {declared}, not in {stated}")
     definition = description.units.get(unit) if unit else None
     if definition is None or definition.baseUnit is None:
         if unit is None or unit == quantity.unit:
             return Wire(quantity, name, scale, 0.0)
-        sentence = f"the FMU does not define the unit {unit} of '{name}'; leave it out and give scale"
+        sentence = (
+            f"the FMU does not define the unit {unit} of '{name}'; leave it out and give scale"
+        )
         return report(key, sentence)
     base = definition.baseUnit
-    if not _same_dimension(base, quantity.unit):
-        return report(key, f"'{name}' is in {unit}, which is no unit of {quantity.name} [{quantity.unit}]")
+    if base.factor == 0 or not _same_dimension(base, str(unit), quantity.unit):
+        return report(
+            key, f"'{name}' is in {unit}, which is no unit of {quantity.name} [{quantity.unit}]"
+        )
     return Wire(quantity, name, scale * base.factor, scale * base.offset)
 
 
 _DIMENSIONS: Final[dict[str, dict[str, int]]] = {
-    "1": {}, "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "m/s2": {"m": 1, "s": -2}, "rad": {},
-    "rad/s": {"s": -1}, "N": {"kg": 1, "m": 1, "s": -2},
+    "1": {}, "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "m/s2": {"m": 1, "s": -2}, "rad": {"rad": 1},
+    "rad/s": {"rad": 1, "s": -1}, "N": {"kg": 1, "m": 1, "s": -2},
 }  # fmt: skip
 
 
-def _same_dimension(base: Any, unit: str) -> bool:
-    """Compare SI exponents; the radian is optional in FMI, so it does not count."""
-    expected = _DIMENSIONS[re.sub(r"\s", "", unit)]
-    return all(
-        (getattr(base, name, 0) or 0) == expected.get(name, 0)
-        for name in _EXPONENTS
-        if name != "rad"
-    )
+def _same_dimension(base: Any, unit: str, wanted: str) -> bool:
+    """Compare SI exponents. Many tools leave the radian's out, so an angle's unit may tell by its
+    name.
+    """
+    expected = _DIMENSIONS[wanted]
+    found = {name: getattr(base, name, 0) or 0 for name in _EXPONENTS}
+    if expected.get("rad") and not found["rad"] and re.search(r"rad|deg|grad|°", unit):
+        found["rad"] = expected["rad"]
+    return all(found[name] == expected.get(name, 0) for name in _EXPONENTS)

@@ -236,8 +236,8 @@ def build(
 
 
 def build_road_reader(out: Path, cc: str | None = None, cflags: str = "") -> Path:
-    """The vehicle's OpenCRG reader as a shared library of its own, so that the driver reads a user's road
-    with the very code that the wheels run on; returns its path. Raises BuildError.
+    """The vehicle's OpenCRG reader as a shared library of its own, so that the driver reads a
+    user's road with the very code that the wheels run on; returns its path. Raises BuildError.
     """
     model = FMU_DIRECTORY / "vehicle"
     sources = {path.name: path.read_bytes() for path in sorted(model.glob("road_crg*.[ch]"))}

@@ -32,7 +32,8 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     "rad/s": {"rad": 1, "s": -1}, "N": {"kg": 1, "m": 1, "s": -2},
     "km/h": {"m": 1, "s": -1, "factor": 1 / 3.6}, "deg": {"rad": 1, "factor": 0.017453292519943295},
     "%": {"factor": 0.01}, "g": {"m": 1, "s": -2, "factor": 9.81},
-    "m above": {"m": 1, "offset": 250.0}, "% lifted": {"factor": 0.01, "offset": -0.5}, "K": {"K": 1},
+    "m above": {"m": 1, "offset": 250.0}, "% lifted": {"factor": 0.01, "offset": -0.5},
+    "K": {"K": 1}, "Hz": {"s": -1},
 }  # fmt: skip
 
 

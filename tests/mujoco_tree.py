@@ -1,4 +1,4 @@
-"""The vehicle as a MuJoCo tree, built from its parameters alone: the oracle of the multibody equations.
+"""The vehicle as a MuJoCo tree, built from its parameters alone: oracle of the plant's equations.
 
 A free sprung body; each carrier hangs on it by three slides and the hinges toe, camber, knuckle
 pitch and kingpin; each wheel turns on its carrier. The carrier's joint coordinates are functions of
@@ -76,18 +76,25 @@ def tree(p: dict[str, float]) -> Any:
     J, wheel_across = p["Wheel.Inertia"], WHEEL_INERTIA_SHARE * across
     carrier_across = across - wheel_across
     for corner, hub in zip(CORNERS, hubs(p) - body.cog, strict=True):
-        strut = sprung.add_body(  # at most six joints to a body: the kingpin's hinge is the next one's
-            pos=hub, mass=STRUT_MASS_SHARE * mass, inertia=[NO_INERTIA] * 3, ipos=np.zeros(3), explicitinertial=True
+        strut = (
+            sprung.add_body(  # at most six joints to a body: the kingpin's hinge is the next one's
+                pos=hub,
+                mass=STRUT_MASS_SHARE * mass,
+                inertia=[NO_INERTIA] * 3,
+                ipos=np.zeros(3),
+                explicitinertial=True,
+            )
         )
         for axis in np.eye(3):
             strut.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-        for axis in ([0, 0, 1], [1, 0, 0], [0, 1, 0]):
+        for axis in np.eye(3)[[2, 0, 1]]:
             strut.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
         carrier = strut.add_body(
             name=f"carrier{corner}",
             mass=(1 - STRUT_MASS_SHARE - WHEEL_MASS_SHARE) * mass,
             inertia=[carrier_across, p["Wheel.CarrierInertiaY"], carrier_across],
-            ipos=np.zeros(3), explicitinertial=True,
+            ipos=np.zeros(3),
+            explicitinertial=True,
         )
         caster = p[f"Kin.Caster{corner}"]
         kingpin = [-math.sin(caster), 0.0, math.cos(caster)]
@@ -96,7 +103,8 @@ def tree(p: dict[str, float]) -> Any:
             name=f"wheel{corner}",
             mass=WHEEL_MASS_SHARE * mass,
             inertia=[wheel_across, J, wheel_across],
-            ipos=np.zeros(3), explicitinertial=True,
+            ipos=np.zeros(3),
+            explicitinertial=True,
         )
         wheel.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
     for joint in spec.joints:  # toe and kingpin may be parallel, which compiling would warn of
@@ -125,7 +133,9 @@ def guided(p: dict[str, float], corner: str, z: float) -> Guided:
         (0.0, side * lateral, 0.0),
         (0.0, 1.0, 0.0),
         (-side * p[f"Kin.Toe{corner}"], side * p[f"Kin.BumpSteer{corner}"], 0.0),
-        tuple(side * p[f"Kin.{name}{corner}"] for name in ("StaticCamber", "Camber", "CamberCurve")),
+        tuple(
+            side * p[f"Kin.{name}{corner}"] for name in ("StaticCamber", "Camber", "CamberCurve")
+        ),
         (0.0, p[f"Kin.KnucklePitch{corner}"], 0.0),
     ]
     c = np.array(polynomials)
@@ -171,7 +181,7 @@ class Oracle:
         return slice(start, start + JOINTS)
 
     def _place(self, m: Any) -> tuple[Array, Array]:
-        """Set MuJoCo's state; returns J (nv, 14) and the part of the joint accelerations without unknowns."""
+        """Set MuJoCo's state; returns J (nv, 14) and the joint accelerations without unknowns."""
         model, data = self.model, self.data
         J, free = np.zeros((model.nv, 14)), np.zeros(model.nv)
         data.qpos[:7] = [0, 0, 0, *m["quaternion"]]
@@ -197,7 +207,7 @@ class Oracle:
             stage(self.model, self.data)
 
     def _carrier_velocities(self, R: Array) -> tuple[Array, Array]:
-        """Wheel-centre velocities and angular velocities of the carriers, body axes, (4, 3) each."""
+        """Wheel-centre and angular velocities of the carriers, body axes, shape (4, 3) each."""
         both = np.zeros((4, 6))
         for i, body in enumerate(self._bodies("carrier")):
             mujoco.mj_objectVelocity(
@@ -228,6 +238,17 @@ class Oracle:
             mujoco.mj_mulM(self.model, self.data, row, column)
         return M
 
+    def locked_inertia(self) -> tuple[Array, Array]:
+        """The last solved pose as one rigid body: 6x6 matrix about its centre of gravity, and that.
+
+        The centre counts from the reference point; inertial axes.
+        """
+        M = self._mass()[:6, :6]
+        lever = M[3:, :3] / M[0, 0]  # [cog]x
+        cog = np.array([lever[2, 1], lever[0, 2], lever[1, 0]])
+        M[3:, 3:] -= shifted(float(M[0, 0]), cog)
+        return M, cog
+
     def _spin_accelerations(self, R: Array, joints: Array, axle: Array) -> Array:
         """Absolute angular accelerations of the wheels about their axles, shape (4,)."""
         self.data.qacc[:] = joints
@@ -237,7 +258,8 @@ class Oracle:
             mujoco.mj_objectAcceleration(
                 self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body, both[i], 0
             )
-        return np.einsum("ij,ij->i", both[:, :3] @ R, axle)
+        accelerations: Array = np.einsum("ij,ij->i", both[:, :3] @ R, axle)
+        return accelerations
 
     def solve(self, m: Any, brake: Array) -> Answer:
         """Accelerations of a MOTION record, whose corner wrenches act on the wheels.
@@ -258,7 +280,7 @@ class Oracle:
         mujoco.mj_rne(model, data, 0, bias)
         force = J.T @ (self._applied(m, R, brake) - bias - M @ free)
         force[6:10] += m["spring_force"] + m["damper_force"]
-        unknown = np.linalg.solve(J.T @ M @ J, force)
+        unknown: Array = np.linalg.solve(J.T @ M @ J, force).astype(np.float64)
         return Answer(
             acceleration=R.T @ unknown[:3],
             angular_acceleration=unknown[3:6],

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
+import functools
 import subprocess
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -44,10 +47,27 @@ GRIP_NAMES = (
     *("dissipation", "peak_x", "peak_y"),
 )
 FORCE_NAMES = ("Fx", "Fy", "Mz", "peak_x", "peak_y")
+_POINTER, _REAL, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int
+SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
+    "new": (_POINTER,),
+    "free": (None, _POINTER),
+    "set": (_INT, _POINTER, ctypes.c_char_p, _REAL),
+    "prepare": (_INT, _POINTER),
+    "multibody": (None, _POINTER, _POINTER, _POINTER),
+    "magic_formula": (None, _POINTER, *[_REAL] * 5, _POINTER),
+    "relaxation_y": (_REAL, _POINTER, _REAL, _REAL),
+    "rolling_radius": (_REAL, _POINTER, _REAL, _REAL),
+    "tyre": (None, _POINTER, _POINTER, _INT, _POINTER),
+    "damper": (_REAL, _POINTER, _INT, _REAL),
+}
 
 
-def compile_probe(folder: Path) -> Path:
-    """Compile the probe with the vehicle's sources; returns the shared library."""
+@functools.cache
+def library() -> Path:
+    """The probe compiled with the vehicle's sources, once for all tests of a session."""
+    temporary = tempfile.TemporaryDirectory()
+    atexit.register(temporary.cleanup)
+    folder = Path(temporary.name)
     table = variables.read_table(VEHICLE / "variables.toml")
     (folder / "variables.h").write_text(generate.header(table), encoding="utf-8")
     (folder / "variables.c").write_text(generate.source(table, "{}"), encoding="utf-8")
@@ -62,6 +82,7 @@ def compile_probe(folder: Path) -> Path:
     return target
 
 
+@functools.cache
 def table_values() -> dict[str, float]:
     """Start values of the vehicle's numeric variables by name, SI."""
     table = variables.read_table(VEHICLE / "variables.toml")
@@ -69,36 +90,32 @@ def table_values() -> dict[str, float]:
 
 
 class Probe:
-    """One parameterisation of the plant; corner order FL FR RL RR, SI units, ISO 8855 axes."""
+    """One parameterisation of the plant; corner order FL FR RL RR, SI units, ISO 8855 axes.
 
-    def __init__(self, library: Path, settings: dict[str, float] | None = None) -> None:
-        self._lib = ctypes.CDLL(str(library))
-        for name in ("relaxation_y", "rolling_radius"):
-            getattr(self._lib, f"probe_{name}").argtypes = [ctypes.c_double] * 2
-            getattr(self._lib, f"probe_{name}").restype = ctypes.c_double
-        self._lib.probe_set.argtypes = [ctypes.c_char_p, ctypes.c_double]
-        self._lib.probe_damper.argtypes = [ctypes.c_int, ctypes.c_double]
-        self._lib.probe_damper.restype = ctypes.c_double
-        self._lib.probe_magic_formula.argtypes = [*[ctypes.c_double] * 5, ctypes.c_void_p]
-        self.parameters: dict[str, float] = {}
-        self.configure(settings or {})
+    `settings` (by variable name) go over the table's start values. Raises KeyError for a name that
+    the table does not have, ValueError where the vehicle refuses the parameters.
+    """
 
-    def configure(self, settings: dict[str, float]) -> None:
-        """Take the table's start values with `settings` (by variable name) over them."""
-        self._lib.probe_reset()
-        for name, value in settings.items():
-            if self._lib.probe_set(name.encode(), value) != 0:
+    def __init__(self, settings: dict[str, float] | None = None) -> None:
+        self._lib = ctypes.CDLL(str(library()))
+        for name, (result, *arguments) in SIGNATURES.items():
+            function = getattr(self._lib, f"probe_{name}")
+            function.restype, function.argtypes = result, arguments
+        self._plant = self._lib.probe_new()
+        self.parameters = {**table_values(), **(settings or {})}
+        for name, value in (settings or {}).items():
+            if self._lib.probe_set(self._plant, name.encode(), value) != 0:
                 raise KeyError(name)
-        if self._lib.probe_prepare() != 0:
+        if self._lib.probe_prepare(self._plant) != 0:
             raise ValueError("the vehicle refuses these parameters")
-        self.parameters = {**table_values(), **settings}
+
+    def __del__(self) -> None:
+        self._lib.probe_free(self._plant)
 
     def multibody(self, motion: npt.NDArray[np.void]) -> Any:
         """Accelerations and kinetic energy (a RESPONSE record) of a MOTION record."""
         response = np.zeros((), RESPONSE)
-        self._lib.probe_multibody(
-            ctypes.c_void_p(motion.ctypes.data), ctypes.c_void_p(response.ctypes.data)
-        )
+        self._lib.probe_multibody(self._plant, motion.ctypes.data, response.ctypes.data)
         return response
 
     def magic_formula(
@@ -106,7 +123,9 @@ class Probe:
     ) -> dict[str, float]:
         """Fx, Fy, Mz and both friction peaks; side 1 left, -1 right."""
         out = np.zeros(5)
-        self._lib.probe_magic_formula(Fz, kappa, tan_alpha, gamma, side, out.ctypes.data)
+        self._lib.probe_magic_formula(
+            self._plant, Fz, kappa, tan_alpha, gamma, side, out.ctypes.data
+        )
         return dict(zip(FORCE_NAMES, out.tolist(), strict=True))
 
     def tyre(self, corner: int, **rolling: float | tuple[float, float, float]) -> dict[str, float]:
@@ -114,19 +133,17 @@ class Probe:
         given, out = np.zeros((), ROLLING), np.zeros(len(GRIP_NAMES))
         for name, value in rolling.items():
             given[name] = value
-        self._lib.probe_tyre(
-            ctypes.c_void_p(given.ctypes.data), corner, ctypes.c_void_p(out.ctypes.data)
-        )
+        self._lib.probe_tyre(self._plant, given.ctypes.data, corner, out.ctypes.data)
         return dict(zip(GRIP_NAMES, out.tolist(), strict=True))
 
     def relaxation_y(self, Fz: float, radius: float) -> float:
         """Lateral relaxation length."""
-        return float(self._lib.probe_relaxation_y(Fz, radius))
+        return float(self._lib.probe_relaxation_y(self._plant, Fz, radius))
 
     def rolling_radius(self, Fz: float, radius: float) -> float:
         """Effective rolling radius."""
-        return float(self._lib.probe_rolling_radius(Fz, radius))
+        return float(self._lib.probe_rolling_radius(self._plant, Fz, radius))
 
     def damper(self, which: int, velocity: float) -> float:
         """Force of the passive (0), soft (1) or hard (2) curve, front wheel."""
-        return float(self._lib.probe_damper(which, velocity))
+        return float(self._lib.probe_damper(self._plant, which, velocity))

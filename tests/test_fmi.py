@@ -1,10 +1,10 @@
-"""One FMU behind `Slave`: the same bits as a plain FMPy loop, and what is said when a call fails."""
+"""One FMU behind `Slave`: the bits of a plain FMPy loop, and what is said when a call fails."""
 
 from __future__ import annotations
 
 import tempfile
+import xml.etree.ElementTree as ET
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import fmpy
@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
-from foreign_fmu import Variable, own_variables, parrot, repackage
+from foreign_fmu import Variable, own_variables, parrot, repackage, variables_of
 
 from cosim.errors import FmuError
 from cosim.fmi import Description, Slave, Value
@@ -119,12 +119,12 @@ def parrot_fmu(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder that FMUs are extracted to."""
     folder = tmp_path / "scratch"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    yield folder
+    return folder
 
 
 def test_the_arrays_stay_where_they_are(parrot_fmu: Path) -> None:
@@ -186,9 +186,7 @@ def test_instances_do_not_meet(version: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("status", "word"), [(2, "Discard"), (3, "Error"), (4, "Fatal")])
-def test_a_failed_step_names_file_time_and_status(
-    parrot_fmu: Path, status: int, word: str
-) -> None:
+def test_a_failed_step_names_file_time_and_status(parrot_fmu: Path, status: int, word: str) -> None:
     slave = Slave(Description(parrot_fmu), [], ["Car.ax"])
     slave.initialise({"Parrot.FailAt": 3, "Parrot.FailStatus": status})
     slave.step(0, H)
@@ -275,9 +273,8 @@ def test_no_model_description(tmp_path: Path) -> None:
 
 
 def test_model_exchange_only(parrot_fmu: Path, tmp_path: Path) -> None:
-    def edit(root: object) -> None:
-        element = next(e for e in root if e.tag == "CoSimulation")  # type: ignore[attr-defined]
-        element.tag = "ModelExchange"
+    def edit(root: ET.Element) -> None:
+        next(root.iter("CoSimulation")).tag = "ModelExchange"
 
     path = repackage(parrot_fmu, tmp_path / "exchange.fmu", edit)
     with pytest.raises(FmuError, match=r"exchange\.fmu: .*co-simulation"):
@@ -297,15 +294,25 @@ def test_no_binary_for_this_machine(parrot_fmu: Path, tmp_path: Path, scratch: P
 def test_model_description_of_another_build(tmp_path: Path) -> None:
     """The instantiation token does not fit: the FMU's own sentence says so."""
 
-    def edit(root: object) -> None:
-        root.set("instantiationToken", "{0}")  # type: ignore[attr-defined]
+    def edit(root: ET.Element) -> None:
+        root.set("instantiationToken", "{0}")
 
     path = repackage(builtin_fmu(), tmp_path / "mixed.fmu", edit)
     with pytest.raises(FmuError, match=r"mixed\.fmu: could not load: .*different builds"):
         Slave(Description(path), [], ["Car.ax"])
 
 
-def test_units_of_variables_and_of_their_types(parrot_fmu: Path) -> None:
-    description = Description(parrot_fmu)
+def test_units_of_variables_and_of_their_types(parrot_fmu: Path, tmp_path: Path) -> None:
+    def edit(root: ET.Element) -> None:
+        types = ET.SubElement(root, "TypeDefinitions")
+        if root.get("fmiVersion") == "2.0":
+            ET.SubElement(ET.SubElement(types, "SimpleType", name="Speed"), "Real", unit="m/s")
+        else:
+            ET.SubElement(types, "Float64Type", name="Speed", unit="m/s")
+        clock = variables_of(root)["Parrot.Step"]
+        (clock if clock.tag == "Float64" else clock[0]).set("declaredType", "Speed")
+
+    description = Description(repackage(parrot_fmu, tmp_path / "typed.fmu", edit))
     assert description.unit_of("Car.vx") == "m/s"
+    assert description.unit_of("Parrot.Step") == "m/s"
     assert description.unit_of("Parrot.Time") is None

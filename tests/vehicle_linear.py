@@ -114,7 +114,8 @@ class LinearCar:
         """Wheel centre and axle in the inertial frame."""
         g, q = self.gains, p[TRAVEL + i]
         R = rotation(2, p[YAW]) @ rotation(1, p[PITCH]) @ rotation(0, p[ROLL])
-        shift = [-(g["Recession"][i] + g["RecessionCurve"][i] * q) * q, SIDE[i] * g["Lateral"][i] * q, q]
+        back = (g["Recession"][i] + g["RecessionCurve"][i] * q) * q
+        shift = [-back, SIDE[i] * g["Lateral"][i] * q, q]
         toe = SIDE[i] * g["BumpSteer"][i] * q
         camber = SIDE[i] * (g["Camber"][i] + g["CamberCurve"][i] * q) * q
         axle = R @ rotation(2, toe) @ rotation(0, camber) @ np.array([0.0, 1.0, 0.0])
@@ -129,9 +130,8 @@ class LinearCar:
     def potential(self, p: Array) -> float:
         """Potential energy [J]."""
         unsprung = parameter("Body.UnsprungMass") / 4.0
-        hub0 = self.hub.mean(axis=0)
         sprung_mass = parameter("Body.Mass") - 4.0 * unsprung
-        offset = -4.0 * unsprung * hub0 / sprung_mass
+        offset = -4.0 * unsprung * self.hub.mean(axis=0) / sprung_mass
         R = rotation(2, p[YAW]) @ rotation(1, p[PITCH]) @ rotation(0, p[ROLL])
         energy = sprung_mass * G * (p[Z] + (R @ offset)[2])
         rates = per_corner("Susp.WheelRate@")
@@ -182,10 +182,33 @@ class LinearCar:
     def eigenvalues(self) -> Array:
         """Eigenvalues with positive imaginary part, ascending [rad/s]."""
         zero, one = np.zeros((10, 10)), np.eye(10)
-        A = np.block([[zero, one], [-np.linalg.solve(self.M, self.K), -np.linalg.solve(self.M, self.C)]])
+        flow = -np.linalg.solve(self.M, np.hstack([self.K, self.C]))
+        A = np.vstack([np.hstack([zero, one]), flow])
         values = np.linalg.eigvals(A)
         values = values[values.imag > 1.0]
         return np.asarray(values[np.argsort(values.imag)])
+
+    def steady_turn(self) -> Array:
+        """Static p per unit lateral acceleration (to the left), shape (10,).
+
+        Inertia forces on all masses, tyre forces at the contact points (axles share by the moments about z), and
+        the wheels' gyroscopic moment. What is not held by stiffness (x, y, yaw) stays zero.
+        """
+        load = -self.M[:, Y].copy()
+        momentum = parameter("Wheel.Inertia") / parameter("Wheel.KinematicRadius")
+        for i in range(4):
+            down = np.array([0.0, 0.0, -self.radius[i]])
+            contact = self.hub[i] + down
+            lateral = np.zeros(10)
+            lateral[Y], lateral[ROLL], lateral[YAW] = 1.0, -contact[2], contact[0]
+            lateral[TRAVEL + i] = (self.path[i] + np.cross(self.turn[i], down))[1]
+            load += lateral * (self.loads[2 * (i // 2) :][:2].sum() / (2.0 * G))
+            load[ROLL] += momentum
+            load[TRAVEL + i] += momentum * self.turn[i, 0]
+        held = np.array([Z, ROLL, PITCH, *range(TRAVEL, 10)])
+        p = np.zeros(10)
+        p[held] = np.linalg.solve(self.K[np.ix_(held, held)], load[held])
+        return p
 
     def response(self, omega: float, road: Array, slope: Array) -> Array:
         """Complex p (10,) to the road's complex elevation and slope under each wheel, (4,) each.

@@ -26,16 +26,30 @@ INPUTS = (
 )  # fmt: skip
 STEER, GAS, BRAKE, FRICTION, DAMPERS = 0, 1, 2, 3, slice(4, 8)
 G = 9.81
-RAMP_ON = 0.5  # of the made-to-measure roads the feature starts no earlier than this [m]
 
 
 def each(pattern: str, value: Value | tuple[Value, Value]) -> dict[str, Value]:
-    """Return start values of one per-corner parameter ("@" is the corner): one value or (front, rear)."""
+    """Start values of one per-corner parameter ("@" is the corner): one value or (front, rear)."""
     front, rear = value if isinstance(value, tuple) else (value, value)
     return {pattern.replace("@", c): front if c[0] == "F" else rear for c in CORNERS}
 
 
 CENTRED: dict[str, Value] = {"Body.CogToLeft": 0.8125, "Body.CogToRight": 0.8125}
+NO_DRAG: dict[str, Value] = {"Tire.QSY1": 0.0, "Aero.Area": 0.0}
+NO_GRIP: dict[str, Value] = {
+    "Tire.PKX1": 0.01, "Tire.PKX2": 0.0, "Tire.PKY1": -0.01, "Tire.QDZ1": 0.0,
+    "Tire.CarcassDampingX": 0.0, "Tire.CarcassDampingY": 0.0, "Tire.StandstillDamping": 0.0,
+    "Tire.LoadDependentRadius": False,
+}  # fmt: skip
+TABLE_SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)  # of the damper tables [m/s]
+
+
+def linear_dampers(front: float, rear: float) -> dict[str, Value]:
+    """Start values that make the passive dampers linear: N s/m at the wheel."""
+    start: dict[str, Value] = {"Damp.Passive": True, **each("Damp.Scale@", (front / 1e3, rear / 1e3))}
+    for k, v in enumerate(TABLE_SPEEDS, 1):
+        start |= {f"Damp.Passive{way}{k}": 1e3 * v for way in ("Rebound", "Compression")}
+    return start
 
 
 @cache
@@ -160,6 +174,16 @@ class Cruise:
 # ---------------------------------------------------------------- roads
 
 
+def straight_track(length: float, grade: float = 0.0) -> Track:
+    """A straight track along x from x = -20 m."""
+    s = -20.0 + DS * np.arange(round((length + 20.0) / DS) + 1)
+    zero = np.zeros_like(s)
+    return Track(
+        name="rig", length=length, closed=False, s=s, x=s.copy(), y=zero, z=grade * s, heading=zero,
+        curvature=zero, grade=zero + grade, banking=zero, speed_limit=zero + np.inf,
+    )  # fmt: skip
+
+
 def straight_road(
     path: Path,
     elevation: Callable[[Array, Array], Array],
@@ -169,14 +193,9 @@ def straight_road(
     grade: float = 0.0,
 ) -> str:
     """Write a straight road along x from x = -20 m with `elevation(s[:, None], v)` [m] and a grade."""
-    s = -20.0 + DS * np.arange(round((length + 20.0) / DS) + 1)
-    zero = np.zeros_like(s)
-    track = Track(
-        name="rig", length=length, closed=False, s=s, x=s.copy(), y=zero, z=grade * s, heading=zero,
-        curvature=zero, grade=zero + grade, banking=zero, speed_limit=zero + np.inf,
-    )  # fmt: skip
+    track = straight_track(length, grade)
     v = np.array([-4.5, 4.5]) if columns is None else columns
-    grid = np.broadcast_to(elevation(s[:, None], v), (len(s), len(v)))
+    grid = np.broadcast_to(elevation(track.s[:, None], v), (len(track.s), len(v)))
     write_crg(path, track, v, grid.astype(np.float32))
     return str(path)
 

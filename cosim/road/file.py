@@ -26,8 +26,8 @@ def track_of_file(path: Path) -> Track:
     """Return the reference line of an OpenCRG file as a track.
 
     The car starts `LEAD_IN` behind the file's beginning, so that all of it stands on the road; that
-    place is s = 0. The lap ends 10 m before the road does. No stops, and a speed limit of 120 km/h. Raises `RoadError` with
-    the reader's own sentence, or if the road is too short to drive on.
+    place is s = 0. The lap ends 10 m before the road does. No stops, and a speed limit of 120 km/h.
+    Raises `RoadError` with the reader's own sentence, or if the road is too short to drive on.
     """
     library = _library()
     error = ctypes.create_string_buffer(1024)

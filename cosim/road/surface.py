@@ -58,7 +58,7 @@ class Smooth:
 
     label: ClassVar[str] = "smooth"
 
-    def columns(self, s: Floats) -> Floats:  # noqa: ARG002 - the same for every road
+    def columns(self, s: Floats) -> Floats:
         """Return the two edges [m]."""
         return np.array([-HALF_WIDTH, HALF_WIDTH])
 
@@ -174,7 +174,7 @@ class Bumps:
         """For example bumps-0.03x0.5x4."""
         return f"bumps-{self.height:g}x{self.length:g}x{self.spacing:g}"
 
-    def columns(self, s: Floats) -> Floats:  # noqa: ARG002 - the same for every road
+    def columns(self, s: Floats) -> Floats:
         """Return the edges, the middle and the bumps' inner ends [m]."""
         return np.array([-HALF_WIDTH, -self._inner, 0.0, self._inner, HALF_WIDTH])
 

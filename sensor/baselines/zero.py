@@ -18,7 +18,7 @@ class Zero:
         """Forget all samples."""
         self.estimate.fill(np.nan)
 
-    def step(self, measured: Array) -> bool:  # noqa: ARG002
+    def step(self, measured: Array) -> bool:
         """Take one sample (14,)."""
         self.estimate.fill(0.0)
         return True

@@ -1,15 +1,11 @@
 """Real-time factors and loop overhead: `python tests/benchmarks/bench_loop.py`.
 
-Everything is measured in this one process, on one thread. The loop's overhead per step is the time of a run less the time
-of the same FMU stepped by bare C calls; beside it stands FMPy's `simulate_fmu` on the same FMU, inputs and outputs.
+Everything is measured in this one process, on one thread. The loop's overhead per step is the time
+of a run less the time of the same FMU stepped by bare C calls; beside it stands FMPy's
+`simulate_fmu` on the same FMU, inputs and outputs.
 """
 
 from __future__ import annotations
-
-import os
-
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[name] = "1"
 
 import statistics
 import time
@@ -58,7 +54,9 @@ def start_values() -> dict[str, Any]:
 
 
 def bare_steps() -> float:
-    """The FMU's own stepping: nothing but fmi3DoStep with wrapped arguments, the car rolling straight on."""
+    """The FMU's own stepping: nothing but fmi3DoStep with wrapped arguments, the car rolling
+    straight on.
+    """
     slave = Slave(Description(builtin_fmu()), [], [])
     slave.initialise(start_values())
     begin = time.perf_counter()
@@ -138,7 +136,10 @@ def main() -> None:
     for what, seconds in rows.items():
         print(f"| {what} | {seconds * per_step:.1f} | {DURATION / seconds:.0f} |")
     exchange, loop, theirs = ours - bare, silent - bare, fmpys - bare
-    print(f"\nexchange with the FMU: {exchange * per_step:.1f} us per step over the bare FMU, ", end="")
+    print(
+        f"\nexchange with the FMU: {exchange * per_step:.1f} us per step over the bare FMU, ",
+        end="",
+    )
     print(f"{exchange / theirs:.2f} of simulate_fmu's {theirs * per_step:.1f} us")
     print(f"loop with driver, recorder and controller: {loop * per_step:.1f} us per step, ", end="")
     print(f"{loop / theirs:.2f} of simulate_fmu's")

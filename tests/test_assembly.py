@@ -1,0 +1,242 @@
+"""From a scenario to blocks: parameters, roads, networks, and what is wrong with them, in place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_fmu import ECHO, Variable, own_variables, parrot
+from loop_rig import Blind, Guess, write_scenario
+
+from cosim import assembly
+from cosim.assembly import Assembly, assemble, record_groups
+from cosim.controller import FixedDampers
+from cosim.errors import InputError, NetworkError
+from cosim.scenario.load import load
+from sensor import SensorError
+
+SHORT = "0.05"
+
+
+def build(folder: Path, duration: str = SHORT, number: int = 0, **sections: str) -> Assembly:
+    """The blocks of a short run, its FMU already freed."""
+    scenario = load(write_scenario(folder, duration=duration, **sections))
+    built = assemble(scenario, scenario.controllers[number], sensor=Blind())
+    built.vehicle.close()
+    return built
+
+
+def complaints(folder: Path, **sections: str) -> list[str]:
+    with pytest.raises(InputError) as caught:
+        build(folder, **sections)
+    return [str(problem) for problem in caught.value.problems]
+
+
+def driven(folder: Path, duration: str = SHORT, **sections: str) -> Assembly:
+    scenario = load(write_scenario(folder, duration=duration, **sections))
+    built = assemble(scenario, scenario.controllers[0], sensor=Blind())
+    built.run(None)
+    return built
+
+
+# ---------------------------------------------------------------- parameters
+
+
+@pytest.mark.parametrize(
+    ("parameter", "sentence"),
+    [
+        ("Bdy.Mass: 2000", "has no parameter 'Bdy.Mass'; did you mean 'Body.Mass'?"),
+        ("Body.Mass: 400", "Body.Mass = 400 kg is below its least value 500 kg"),
+        ("Body.Mass: 2e4", "Body.Mass = 20000 kg is above its greatest value 10000 kg"),
+        ("PT.RearShare: 1.01", "PT.RearShare = 1.01 is above its greatest value 1"),
+        ("Body.Mass: heavy", "Body.Mass = 'heavy' must be a number"),
+        ("Body.Mass: true", "Body.Mass = True must be a number"),
+        ("SlipControl.Active: 1", "SlipControl.Active = 1.0 must be true or false"),
+        ("Car.ax: 1", "has no parameter 'Car.ax'"),
+        ("Road.File: road.crg", "'Road.File' is set by road; use that"),
+        ("Init.Velocity: 3", "'Init.Velocity' is set by driver.speed_kmh; use that"),
+        ("Damp.Passive: true", "'Damp.Passive' is set by controllers; use that"),
+    ],
+)
+def test_a_parameter_that_does_not_fit(tmp_path: Path, parameter: str, sentence: str) -> None:
+    (complaint,) = complaints(tmp_path, vehicle=f"{{parameters: {{{parameter}}}}}")
+    assert sentence in complaint
+    assert complaint.startswith(f"{tmp_path / 'scenario.yaml'}:5:")
+
+
+def test_every_parameter_that_does_not_fit(tmp_path: Path) -> None:
+    vehicle = "{parameters: {Body.Mass: 1, Brake.Lag: 0, Tire.Radiu: 0.3}}"
+    assert len(complaints(tmp_path, vehicle=vehicle)) == 3
+
+
+def test_parameters_at_the_ends_of_their_range_reach_the_fmu(tmp_path: Path) -> None:
+    vehicle = "{parameters: {Brake.FrontShare: 0, PT.RearShare: 1, Aero.Drag: 0}}"
+    free = driven(tmp_path, "1", vehicle=vehicle, driver="{speed_kmh: 120}")
+    plain = driven(tmp_path, "1", driver="{speed_kmh: 120}")
+    speed = [run.recorder.group("channels")[-1, 6] for run in (free, plain)]
+    assert speed[0] > speed[1] + 0.05  # the driver reckons with a drag that is not there
+
+
+def test_an_input_that_the_loop_writes_is_no_parameter(tmp_path: Path) -> None:
+    assert complaints(tmp_path, vehicle="{parameters: {DM.Gas: 0.5}}")
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [
+        pytest.param("Int32", "1.5", id="no whole number"),
+        pytest.param("Int64", "1", id="a type that is not supported"),
+    ],
+)
+def test_parameters_of_another_fmu(tmp_path: Path, kind: str, value: str) -> None:
+    odd = Variable("Odd", 450, "parameter", type=kind, start=1)
+    parrot(tmp_path / "p.fmu", (*own_variables().values(), odd))
+    vehicle = f"{{fmu: p.fmu, parameters: {{Odd: {value}}}}}"
+    (complaint,) = complaints(tmp_path, vehicle=vehicle)
+    assert "Odd" in complaint
+
+
+def test_another_fmu_may_have_names_that_are_taken_here(tmp_path: Path) -> None:
+    odd = Variable("Init.x", 450, "parameter", start=1)
+    parrot(tmp_path / "p.fmu", (*own_variables().values(), odd))
+    build(tmp_path, vehicle="{fmu: p.fmu, parameters: {Init.x: 3}}")
+
+
+def test_limits_of_another_fmu(tmp_path: Path) -> None:
+    odd = replace(Variable("Odd", 450, "parameter", "m/s"), start=1.0, limits=(0.5, 2.0))
+    parrot(tmp_path / "p.fmu", (*own_variables().values(), odd))
+    (complaint,) = complaints(tmp_path, vehicle="{fmu: p.fmu, parameters: {Odd: 3}}")
+    assert "Odd = 3 m/s is above its greatest value 2 m/s" in complaint
+
+
+# ---------------------------------------------------------------- start, road, end
+
+
+def test_the_car_starts_on_the_track_at_the_profiles_speed(tmp_path: Path) -> None:
+    car = driven(tmp_path, driver="{speed_kmh: 36}")
+    x, y, yaw = car.recorder.group("vehicle")[0, :3]
+    assert (x, y, yaw) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert car.recorder.group("channels")[0, 6] == pytest.approx(10.0)
+
+
+def test_a_road_without_a_speed_limit(tmp_path: Path) -> None:
+    """Either there is a speed to start with, or the scenario is told that it needs one."""
+    try:
+        build(tmp_path, driver="{style: normal}")
+    except InputError as error:
+        assert "speed_kmh" in str(error)
+
+
+def test_a_road_file_that_is_none_is_shown_in_place(tmp_path: Path) -> None:
+    (tmp_path / "r.crg").write_text("no road\n")
+    path = tmp_path / "scenario.yaml"
+    path.write_text("name: a\nduration: 1\nroad: {file: r.crg}\n")
+    scenario = load(path)
+    with pytest.raises(InputError, match=r"scenario\.yaml:3:14: .*r\.crg"):
+        assemble(scenario, scenario.controllers[0], sensor=Blind())
+
+
+def test_the_run_ends_with_the_road(tmp_path: Path) -> None:
+    scenario = load(write_scenario(tmp_path, duration="lap", length_m=30))
+    built = assemble(scenario, scenario.controllers[0], sensor=Blind())
+    result = built.run(None)
+    assert result.finish_reason == "end of the road"
+    assert result.lap_time_s == result.simulated_s == built.recorder.time[-1]
+    assert result.lap_time_s == pytest.approx(30 / (50 / 3.6), abs=0.05)
+    assert built.recorder.rows == result.steps_done + 1
+    x = built.recorder.group("vehicle")[:, 0]
+    assert x[-1] >= 30.0 > x[-2]
+    assert result.largest_deviation_m < 0.05
+
+
+def test_the_run_ends_with_the_duration(tmp_path: Path) -> None:
+    scenario = load(write_scenario(tmp_path, duration="0.5"))
+    built = assemble(scenario, scenario.controllers[0], sensor=Blind())
+    result = built.run(None)
+    assert (result.lap_time_s, result.finish_reason) == (None, "duration reached")
+    assert (result.steps_done, result.simulated_s) == (50, 0.5)
+    assert result.wall_time_s > 0
+
+
+def test_a_lap_that_is_given_up_says_so(tmp_path: Path) -> None:
+    """A parrot does not get anywhere: its x is its steering-wheel angle."""
+    parrot(tmp_path / "p.fmu", (*own_variables().values(), Variable("Echo", ECHO)))
+    vehicle = "{fmu: p.fmu, variables: {Car.tx: {name: Echo}}}"
+    scenario = load(write_scenario(tmp_path, duration="lap", length_m=20, vehicle=vehicle))
+    result = assemble(scenario, scenario.controllers[0], sensor=Blind()).run(None)
+    assert result.lap_time_s is None
+    assert "duration" not in result.finish_reason
+
+
+def test_comfort_leaves_the_start_out(tmp_path: Path) -> None:
+    """There are figures from two seconds on after the first two."""
+    bumps = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 5}"
+    scenario = load(write_scenario(tmp_path, duration="4.5", surface=bumps))
+    figures = assemble(scenario, scenario.controllers[0], sensor=Blind()).run(None).comfort
+    assert set(figures) == {"weighted_acceleration_m_s2", "deflection_rms_m", "tyre_load_rms_n"}
+    assert all(value > 0 for value in figures.values())
+    scenario = load(write_scenario(tmp_path, duration="3.9", surface=bumps))
+    assert not assemble(scenario, scenario.controllers[0], sensor=Blind()).run(None).comfort
+
+
+# ---------------------------------------------------------------- controllers and networks
+
+
+def test_passive_dampers_are_the_fmus_own_curve(tmp_path: Path) -> None:
+    """Not the soft end of the semi-active ones, which command 0 would be."""
+    bumps = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 5}"
+    scenario = load(write_scenario(tmp_path, duration="2", surface=bumps))
+    runs = []
+    for dampers in (None, FixedDampers(0.0)):
+        built = assemble(scenario, scenario.controllers[0], Blind(), dampers)
+        built.run(None)
+        np.testing.assert_array_equal(built.recorder.group("command"), 0.0)
+        runs.append(np.std(built.recorder.group("truth")))
+    assert runs[1] > 1.1 * runs[0]
+
+
+def test_skyhook_starts_with_its_initial_command(tmp_path: Path) -> None:
+    controllers = "[{kind: skyhook, feedback: estimate, initial_command: 0.3}]"
+    scenario = load(write_scenario(tmp_path, duration="0.5", controllers=controllers))
+    built = assemble(scenario, scenario.controllers[0], sensor=Guess())
+    built.run(None)
+    np.testing.assert_array_equal(built.recorder.group("command")[:18], 0.3)
+    assert (built.recorder.group("command")[18:] != 0.3).any()
+
+
+def test_a_network_that_is_none(tmp_path: Path) -> None:
+    (tmp_path / "n.onnx").write_text("no network")
+    scenario = load(write_scenario(tmp_path, sensor="{network: n.onnx}"))
+    with pytest.raises(NetworkError, match=r"n\.onnx"):
+        assemble(scenario, scenario.controllers[0])
+
+
+def test_an_installation_without_a_network(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none() -> Path:
+        raise SensorError("no such model is shipped here")
+
+    monkeypatch.setattr(assembly, "default_model", none)
+    scenario = load(write_scenario(tmp_path))
+    with pytest.raises(NetworkError, match="no such model"):
+        assemble(scenario, scenario.controllers[0])
+
+
+def test_files_that_decide_the_result_are_named(tmp_path: Path) -> None:
+    files = build(tmp_path).files
+    assert set(files) == {"fmu", "road"}
+    assert all(path.is_file() for path in files.values())
+
+
+def test_the_record_names_every_column_once_with_its_unit() -> None:
+    signals = [signal for _, group in record_groups() for signal in group]
+    names = [signal.name for signal in signals]
+    assert len(set(names)) == len(names)
+    assert [name for name, _ in record_groups()] == [
+        "channels", "estimate", "valid", "truth", "command", "driver", "vehicle",
+    ]  # fmt: skip
+    assert {s.name: s.header for s in signals}["Car.CFL.q0"] == "Car.CFL.q0 [m]"
+    assert {s.name: s.header for s in signals}["DM.Gas"] == "DM.Gas"

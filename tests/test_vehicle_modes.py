@@ -1,0 +1,189 @@
+"""The vehicle's small motions against an independent linearisation: rest, eigenfrequencies, frequency response.
+
+On a road without grip the car is a holonomic system of which `vehicle_linear` writes down energy and
+inertia from the parameters alone; the FMU has to move as its eigenvalues say.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from vehicle_linear import PITCH, ROLL, SIDE, TRAVEL, LinearCar, Z, per_corner
+from vehicle_rig import (
+    CORNERS,
+    DS,
+    G,
+    NO_DRAG,
+    NO_GRIP,
+    Array,
+    Record,
+    Rig,
+    cosine_bump,
+    each,
+    linear_dampers,
+    parameter,
+    run,
+    straight_road,
+)
+
+TWO_SIDES = np.array([-4.5, -0.3, 0.3, 4.5])  # columns of a road with a left and a right half
+NO_KINEMATICS = {
+    k: v
+    for name in (
+        "RollCentre", "Recession", "RecessionCurve", "KnucklePitch", "Camber", "CamberCurve", "BumpSteer",
+    )
+    for k, v in each(f"Kin.{name}@", 0.0).items()
+}  # fmt: skip
+
+
+def modes_hz(kinematics: bool = True) -> Array:
+    return np.asarray(LinearCar(kinematics=kinematics).eigenvalues().imag / (2.0 * np.pi))
+
+
+# ---------------------------------------------------------------- rest
+
+
+def test_static_wheel_loads() -> None:
+    with Rig() as rig:
+        loads = [rig[f"Car.Fz{c}"] for c in CORNERS]
+        travels = [rig[f"Car.C{c}.q0"] for c in CORNERS]
+    assert loads == pytest.approx(LinearCar().loads, abs=1e-3)
+    assert loads == pytest.approx([5770, 5300, 6717, 6170], abs=1.0)
+    assert np.abs(travels).max() < 1e-9
+    assert np.abs(LinearCar().gradient()).max() < 1e-3  # the linear model rests there too [N, N m]
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0, 10.0, 25.0, 45.0])
+def test_starts_in_equilibrium(speed: float) -> None:
+    with Rig({"Init.Velocity": speed}) as rig:
+        accelerations = [rig[f"Car.a{axis}"] for axis in "xyz"]
+        rates = [rig[f"Car.{n}"] for n in ("RollVel", "PitchVel", "YawRate")]
+        travel_rates = [rig[f"Car.C{c}.q0p"] for c in CORNERS]
+        assert np.hypot(rig["Car.vx"], rig["Car.vz"]) == pytest.approx(speed, abs=1e-6)
+        # the ground carries what the air does not: lift, and drag along the pitched body
+        air = 0.5 * 1.2 * 2.6 * speed**2
+        carried = parameter("Body.Mass") * G - air * (0.05 + 0.08 + 0.35 * rig["Car.Pitch"])
+        assert sum(rig[f"Car.Fz{c}"] for c in CORNERS) == pytest.approx(carried, abs=0.1)
+    assert np.abs(accelerations).max() < 1e-5
+    assert np.abs(rates).max() == 0.0
+    assert np.abs(travel_rates).max() == 0.0
+
+
+# ---------------------------------------------------------------- eigenfrequencies
+
+
+def matrix_pencil(signals: Array, dt: float, order: int, window: int) -> Array:
+    """Continuous-time poles [1/s] of free responses, shape (n, signals) (Hua & Sarkar 1990)."""
+    count = len(signals) - window
+    hankel = np.vstack([[y[i : i + window + 1] for i in range(count)] for y in signals.T])
+    right = np.linalg.svd(hankel, full_matrices=False)[2][:order].T
+    return np.asarray(np.log(np.linalg.eigvals(np.linalg.pinv(right[:-1]) @ right[1:])) / dt)
+
+
+def free_response(folder: Path, kinematics: bool) -> Record:
+    """The undamped car behind small bumps that wake all modes."""
+
+    def bumps(s: Array, v: Array) -> Array:
+        left, right = v > 0.0, v < 0.0
+        short, long = cosine_bump(s, 5.0, 1.0, 0.0004), cosine_bump(s, 5.0, 7.0, 0.0008)
+        return cosine_bump(s, 5.0, 3.0, 0.0008) + short * left + long * right
+
+    road = straight_road(folder / "bumps.crg", bumps, columns=TWO_SIDES, length=200.0)
+    start = {
+        "Init.Velocity": 10.0, "Init.x": -5.0, "Road.File": road, "Solver.Step": 0.25e-3,
+        "Tire.Damping": 0.0, **each("Damp.Scale@", 0.0), **NO_GRIP, **NO_DRAG,
+    }  # fmt: skip
+    return run(14.0, start if kinematics else {**start, **NO_KINEMATICS})
+
+
+@pytest.mark.parametrize("kinematics", [True, False])
+def test_eigenfrequencies(tmp_path: Path, kinematics: bool) -> None:
+    record = free_response(tmp_path, kinematics)
+    poles = matrix_pencil(record.corners("Car.C@.q0p")[400:], 0.01, order=14, window=120)
+    found = np.sort(poles.imag[poles.imag > 0.1]) / (2.0 * np.pi)
+    assert found == pytest.approx(modes_hz(kinematics), rel=1e-3)
+    assert np.abs(poles.real).max() < 0.02  # nothing damps, nothing drives
+
+
+def test_ride_frequencies_are_an_suvs() -> None:
+    heave, pitch, roll, *hop = modes_hz()
+    assert heave == pytest.approx(1.27, abs=0.03)
+    assert pitch == pytest.approx(1.55, abs=0.03)
+    assert 1.8 < roll < 2.6
+    assert 14.0 < min(hop) <= max(hop) < 15.5
+
+
+# ---------------------------------------------------------------- frequency response
+
+SPEED, PERIOD = 20.0, 20.0  # of the multisine road [m/s, s]
+FREQUENCIES = np.array(
+    [0.5, 0.8, 1.0, 1.15, 1.3, 1.45, 1.6, 1.8, 2.1, 2.5, 3.0, 4.0, 5.5, 7.0, 9.0, 12.5, 13.5, 14.5]
+)
+PHASES = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, len(FREQUENCIES))
+AMPLITUDES = 0.0002 / FREQUENCIES  # [m]: the car must stay linear and not lose speed
+DAMPING = (2450.0, 3250.0)
+
+
+def multisine_run(folder: Path, antisymmetric: bool, grip: bool) -> Record:
+    def elevation(s: Array, v: Array) -> Array:
+        waves = AMPLITUDES * np.cos(2.0 * np.pi * FREQUENCIES / SPEED * s + PHASES)
+        one_side = waves.sum(axis=1, keepdims=True) * np.clip((s + 15.0) / 20.0, 0.0, 1.0)
+        return one_side * (np.sign(v) if antisymmetric else np.ones_like(v))
+
+    road = straight_road(folder / "sines.crg", elevation, columns=TWO_SIDES, length=700.0)
+    start = {"Init.Velocity": SPEED, "Init.x": -18.0, "Road.File": road, **NO_DRAG}
+    start |= linear_dampers(*DAMPING) | ({} if grip else NO_GRIP)
+    return run(32.0, start)
+
+
+def patch_gains(frequency: float) -> tuple[complex, complex]:
+    """What five points over the patch make of a wave: gains of mean height and fitted slope."""
+    place = parameter("Road.PatchLength") / 5.0 * np.arange(-2, 3)
+    wave = np.exp(2j * np.pi * frequency / SPEED * place)
+    grid = np.sinc(frequency / SPEED * DS) ** 2  # linear between the road's cross sections
+    return grid * wave.mean(), grid * (place @ wave) / (place @ place)
+
+
+def gains(record: Record, names: dict[str, int], antisymmetric: bool) -> dict[str, Array]:
+    """Measured over analytic complex amplitudes of rates, shape (frequencies,) for each name."""
+    car = LinearCar(np.repeat(DAMPING, 2), parameter("Tire.Damping"))
+    window = slice(-round(PERIOD / 0.01) - 1, -1)
+    t, x0 = record.t[window], record["Car.tx"][window][0]
+    out: dict[str, list[complex]] = {name: [] for name in names}
+    for f, amplitude, phase in zip(FREQUENCIES, AMPLITUDES, PHASES, strict=True):
+        omega = 2.0 * np.pi * f
+        start = omega / SPEED * (x0 - SPEED * t[0] + car.hub[:, 0]) + phase
+        road = amplitude * np.exp(1j * start) * (SIDE if antisymmetric else 1.0)
+        height, slope = patch_gains(f)
+        p = car.response(omega, road * height, road * slope)
+        for name, index in names.items():
+            measured = 2.0 * np.mean(record[name][window] * np.exp(-1j * omega * t))
+            acceleration = name in ("Car.ax", "Car.ay", "Car.az")
+            out[name].append(measured / (p[index] * (1j * omega) ** (2 if acceleration else 1)))
+    return {name: np.array(values) for name, values in out.items()}
+
+
+TRAVELS = {f"Car.C{c}.q0p": TRAVEL + i for i, c in enumerate(CORNERS)}
+
+
+@pytest.mark.parametrize("antisymmetric", [False, True])
+def test_frequency_response(tmp_path: Path, antisymmetric: bool) -> None:
+    names = {"Car.RollVel": ROLL} if antisymmetric else {"Car.az": Z, "Car.PitchVel": PITCH}
+    record = multisine_run(tmp_path, antisymmetric, grip=False)
+    for name, ratio in gains(record, names | TRAVELS, antisymmetric).items():
+        assert np.abs(ratio - 1.0).max() < 0.012, name
+
+
+def test_frequency_response_with_grip(tmp_path: Path) -> None:
+    """Grip ties the wheels' fore-and-aft motion to the road; in the vertical it changes little."""
+    record = multisine_run(tmp_path, antisymmetric=False, grip=True)
+    for name, ratio in gains(record, {"Car.az": Z} | TRAVELS, False).items():
+        assert np.abs(ratio - 1.0).max() < 0.1, name
+
+
+def test_roll_stiffness_share() -> None:
+    rates = per_corner("Susp.WheelRate@")
+    track = LinearCar().track
+    front = rates[0] * track**2 / 2.0 + parameter("Susp.AntiRollFront")
+    rear = rates[2] * track**2 / 2.0 + parameter("Susp.AntiRollRear")
+    assert front / (front + rear) == pytest.approx(0.53, abs=0.01)
