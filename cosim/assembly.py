@@ -16,7 +16,7 @@ from cosim.comfort import ride_figures
 from cosim.controller import FixedDampers, Skyhook
 from cosim.course import Course, course_of
 from cosim.driver import PathDriver
-from cosim.errors import InputError, NetworkError
+from cosim.errors import InputError, NetworkError, Problem
 from cosim.fmi import Description, Value
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, TRUTH, Quantity
@@ -159,8 +159,12 @@ def _checked(scenario: Scenario) -> tuple[Wiring, Description, Course]:
         sentence = f"the {course.track.name} road has no speed limit: give driver.speed_kmh"
         problems.append(scenario.problem(("driver", "speed_kmh"), sentence))
     if problems or course is None:
-        raise InputError(problems)
+        raise InputError(sorted(problems, key=_line))
     return wiring, description, course
+
+
+def _line(problem: Problem) -> int:
+    return problem.place.line if problem.place is not None else 0
 
 
 def _unlimited(course: Course) -> bool:

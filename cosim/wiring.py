@@ -138,7 +138,7 @@ def _wire(
             if not quantity.required:
                 return None
             sentence = f"the FMU has no variable for {quantity.name} [{quantity.unit}]; map it"
-            return report(("vehicle", "variables"), sentence)
+            return report(("vehicle", "variables", quantity.name), sentence)
         sentence = f"'{description.path.name}' has no variable '{name}'"
         return report(key, sentence, tuple(description.variables), name)
     if variable.causality not in causality:

@@ -18,7 +18,7 @@ class Blind:
     def __init__(self) -> None:
         self.estimate: Array = np.full(4, np.nan)
 
-    def step(self, measured: Array) -> bool:  # noqa: ARG002 - as the loop calls it
+    def step(self, measured: Array) -> bool:
         return False
 
 

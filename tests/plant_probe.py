@@ -7,6 +7,7 @@ import ctypes
 import functools
 import subprocess
 import tempfile
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -102,15 +103,13 @@ class Probe:
             function = getattr(self._lib, f"probe_{name}")
             function.restype, function.argtypes = result, arguments
         self._plant = self._lib.probe_new()
+        weakref.finalize(self, self._lib.probe_free, self._plant)
         self.parameters = {**table_values(), **(settings or {})}
         for name, value in (settings or {}).items():
             if self._lib.probe_set(self._plant, name.encode(), value) != 0:
                 raise KeyError(name)
         if self._lib.probe_prepare(self._plant) != 0:
             raise ValueError("the vehicle refuses these parameters")
-
-    def __del__(self) -> None:
-        self._lib.probe_free(self._plant)
 
     def multibody(self, motion: npt.NDArray[np.void]) -> Any:
         """Accelerations and kinetic energy (a RESPONSE record) of a MOTION record."""

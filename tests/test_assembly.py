@@ -213,9 +213,7 @@ def test_a_network_that_is_none(tmp_path: Path) -> None:
         assemble(scenario, scenario.controllers[0])
 
 
-def test_an_installation_without_a_network(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_installation_without_a_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def none() -> Path:
         raise SensorError("no such model is shipped here")
 

@@ -8,7 +8,6 @@ import pytest
 from vehicle_rig import (
     BRAKE,
     CENTRED,
-    CORNERS,
     DAMPERS,
     GAS,
     STEER,
@@ -158,7 +157,7 @@ def test_energy_balance_with_motors_brakes_and_steering() -> None:
     record = run(9.0, {"Init.Velocity": 15.0}, drive)
     assert record["Energy.Supplied"][-1] > 5e4
     assert record["Car.vx"][-1] < 1.0
-    assert energy_error(record) < 1e-3
+    assert energy_error(record) < 2e-5
 
 
 def test_energy_balance_over_bumps(tmp_path: Path, rough: Callable[[str], str]) -> None:
@@ -272,10 +271,3 @@ def test_travel_rate_is_the_derivative_of_the_travel(rough: Callable[[str], str]
     paper = record.corners("Car.PaperRelVel@")
     tilt = record["Car.vx"][:, None] * np.sin(np.radians(0.45))
     assert np.abs(paper - (tilt - rate)).max() < 1e-12
-
-
-def test_every_corner_has_every_output() -> None:
-    for name in output_names():
-        for c in CORNERS:
-            if name.endswith(c):
-                assert {name.removesuffix(c) + d for d in CORNERS} <= set(output_names())

@@ -1,0 +1,387 @@
+"""The loop: what stands in row k, how late a command acts, what is left of a run that fails."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from foreign_fmu import ECHO, Variable, own_variables, parrot
+from loop_rig import WINDOW, Blind, Guess, write_scenario
+
+from cosim.assembly import Assembly, assemble
+from cosim.controller import SwitchingDampers
+from cosim.errors import FmuError
+from cosim.loop import Blocks, ControllerBlock, SensorBlock
+from cosim.loop import run as run_loop
+from cosim.recorder import Recorder, Signal
+from cosim.run import execute
+from cosim.scenario.load import load
+from cosim.vehicle import State
+
+Array = npt.NDArray[np.float64]
+
+BUMPS = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 5}"
+CLOSED_LOOP = (
+    "[{kind: passive}, {kind: skyhook, feedback: truth}, {kind: skyhook, feedback: estimate}]"
+)
+
+
+# ---------------------------------------------------------------- with blocks that only count
+
+
+class Counter:
+    """All four blocks in one: every value tells of which sample it is."""
+
+    def __init__(self, last: int = 10_000, fails_at: int | None = None) -> None:
+        self.estimate: Array = np.full(4, np.nan)
+        self.last, self.fails_at = last, fails_at
+        self.calls: list[str] = []
+        self.held: list[tuple[float, float]] = []
+
+    def blocks(self) -> Blocks:
+        return Blocks(_CountingVehicle(self), _CountingDriver(self), self._sensor(), self._damper())
+
+    def _sensor(self) -> SensorBlock:
+        counter = self
+
+        class Sensor:
+            estimate = counter.estimate
+
+            def step(self, measured: Array) -> bool:
+                counter.calls.append("sensor")
+                if measured[0] == counter.fails_at:
+                    raise FmuError("stop")
+                self.estimate[:] = 100 + measured[0]
+                return bool(measured[0] >= 2)
+
+        return Sensor()
+
+    def _damper(self) -> ControllerBlock:
+        counter = self
+
+        class Controller:
+            def step(self, measured: Array, estimate: Array, valid: bool, truth: Array) -> Array:
+                counter.calls.append("controller")
+                assert estimate[0] == 100 + measured[0]
+                assert truth[0] == -measured[0]
+                assert valid == (measured[0] >= 2)
+                return np.full(4, 200 + measured[0])
+
+        return Controller()
+
+
+class _CountingVehicle:
+    def __init__(self, counter: Counter) -> None:
+        self.counter, self.now = counter, 0.0
+
+    def read(self) -> State:
+        self.counter.calls.append("read")
+        k = self.now
+        return State(np.full(14, k), np.full(4, -k), np.full(3, k), np.full(14, 10 * k))
+
+    def check_finite(self, k: int) -> None:
+        self.counter.calls.append("check")
+
+    def step(self, k: int, driver_command: Array, damper_command: Array) -> None:
+        self.counter.calls.append("step")
+        assert k == self.now
+        self.counter.held.append((float(driver_command[0]), float(damper_command[0])))
+        self.now += 1
+
+
+class _CountingDriver:
+    def __init__(self, counter: Counter) -> None:
+        self.counter, self.finished = counter, False
+
+    def step(self, k: int, state: State) -> Array:
+        self.counter.calls.append("driver")
+        self.finished = k >= self.counter.last
+        return np.full(3, 300.0 + k)
+
+
+GROUPS = {
+    "channels": 14, "estimate": 4, "valid": 1, "truth": 4, "command": 4, "driver": 3, "vehicle": 14,
+}  # fmt: skip
+
+
+def recorder(rows: int) -> Recorder:
+    return Recorder(
+        [(name, [Signal(f"{name}{i}", "") for i in range(n)]) for name, n in GROUPS.items()], rows
+    )
+
+
+def test_row_k_is_everything_at_t_k() -> None:
+    record = recorder(6)
+    assert run_loop(Counter().blocks(), record, 5) == 5
+    k = np.arange(6.0)
+    expected = {
+        "channels": k, "estimate": 100 + k, "valid": (k >= 2), "truth": -k, "command": 200 + k,
+        "driver": 300 + k, "vehicle": 10 * k,
+    }  # fmt: skip
+    for name, values in expected.items():
+        for column in record.group(name).T:
+            np.testing.assert_array_equal(column, values)
+    np.testing.assert_array_equal(record.time, [i * 0.01 for i in range(6)])
+
+
+def test_commands_of_row_k_are_held_from_k_on() -> None:
+    counter = Counter()
+    run_loop(counter.blocks(), recorder(6), 5)
+    assert counter.held == [(300.0 + k, 200.0 + k) for k in range(5)]
+
+
+def test_the_vehicle_is_read_checked_and_stepped_once_a_sample() -> None:
+    counter = Counter()
+    run_loop(counter.blocks(), recorder(3), 2)
+    assert [c for c in counter.calls if c in ("read", "check", "step")] == [
+        *("read", "check", "step") * 2, "read", "check",
+    ]  # fmt: skip
+    one = counter.calls[: counter.calls.index("step") + 1]
+    assert one.index("sensor") < one.index("controller")
+    assert sorted(one) == ["check", "controller", "driver", "read", "sensor", "step"]
+
+
+def test_the_last_row_is_that_in_which_the_driver_arrives() -> None:
+    counter, record = Counter(last=3), recorder(100)
+    assert run_loop(counter.blocks(), record, 99) == 3
+    assert record.rows == 4
+    assert len(counter.held) == 3
+
+
+def test_rows_before_an_exception_stay() -> None:
+    record = recorder(100)
+    with pytest.raises(FmuError):
+        run_loop(Counter(fails_at=7).blocks(), record, 99)
+    assert record.rows == 7
+    np.testing.assert_array_equal(record.group("channels")[:, 0], np.arange(7.0))
+
+
+def test_progress_is_told_now_and_then() -> None:
+    told: list[tuple[int, int]] = []
+    run_loop(Counter().blocks(), recorder(501), 500, lambda done, total: told.append((done, total)))
+    assert 2 < len(told) < 50
+    assert all(total == 500 for _, total in told)
+    assert [done for done, _ in told] == sorted({done for done, _ in told})
+
+
+# ---------------------------------------------------------------- with an FMU
+
+
+def parrot_scenario(folder: Path, orders: str = "", **sections: str) -> Path:
+    """A parrot whose accelerations are what the steering wheel and the FL damper were last told."""
+    echoes = (Variable("Echo.Steer", ECHO), Variable("Echo.FL", ECHO + 3))
+    parrot(folder / "p.fmu", (*own_variables().values(), *echoes))
+    mapping = "{Car.ax: {name: Echo.Steer}, Car.ay: {name: Echo.FL}}"
+    vehicle = f"{{fmu: p.fmu, variables: {mapping}, parameters: {{{orders}}}}}"
+    return write_scenario(folder, vehicle=vehicle, **sections)
+
+
+def build(path: Path, sensor: SensorBlock, dampers: ControllerBlock | None = None) -> Assembly:
+    scenario = load(path)
+    return assemble(scenario, scenario.controllers[0], sensor, dampers)
+
+
+def test_one_sample_of_delay(tmp_path: Path) -> None:
+    built = build(parrot_scenario(tmp_path), Blind(), SwitchingDampers(1, 0.01))
+    built.run(None)
+    record = built.recorder
+    steer, damper = record.group("driver")[:, 0], record.group("command")[:, 0]
+    assert len(np.unique(damper)) > 1
+    np.testing.assert_array_equal(record.group("channels")[1:, 0], steer[:-1])
+    np.testing.assert_array_equal(record.group("channels")[1:, 1], damper[:-1])
+
+
+def test_before_the_first_sample_the_dampers_have_the_initial_command(tmp_path: Path) -> None:
+    controllers = "[{kind: skyhook, initial_command: 0.6}]"
+    built = build(parrot_scenario(tmp_path, controllers=controllers), Guess())
+    built.run(None)
+    np.testing.assert_array_equal(built.recorder.group("channels")[:WINDOW, 1], 0.6)
+
+
+@pytest.mark.parametrize(
+    ("orders", "words", "rows"),
+    [
+        ("Parrot.FailAt: 30, Parrot.FailStatus: 3", "t = 0.29 s", 30),
+        ("Parrot.BadAt: 30, Parrot.BadOutput: 105", "Car.YawRate is nan at t = 0.3 s", 30),
+        ("Parrot.BadAt: 30, Parrot.BadOutput: 118", "Car.tx is nan at t = 0.3 s", 30),
+    ],
+    ids=["error", "nan among the channels", "nan in the pose"],
+)
+def test_an_fmu_that_fails_leaves_its_rows_and_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, orders: str, words: str, rows: int
+) -> None:
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    path = parrot_scenario(tmp_path, orders)
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    built = build(path, Blind())
+    assert list(scratch.iterdir())
+    with pytest.raises(FmuError) as caught:
+        built.run(None)
+    assert words in str(caught.value)
+    assert built.recorder.rows == rows
+    assert np.isfinite(built.recorder.group("channels")).all()
+    assert not list(scratch.iterdir())
+
+
+def test_what_was_recorded_before_a_failure_is_written(tmp_path: Path) -> None:
+    path = parrot_scenario(tmp_path, "Parrot.FailAt: 30, Parrot.FailStatus: 3")
+    with pytest.raises(FmuError):
+        execute(load(path), tmp_path / "out", assemble=guessing)
+    assert len((tmp_path / "out" / "signals.csv").read_text().splitlines()) == 31
+
+
+def test_a_run_that_is_interrupted_frees_the_fmu(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    path = parrot_scenario(tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    built = build(path, Blind())
+
+    def interrupt(done: int, total: int) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        built.run(interrupt)
+    assert built.recorder.rows > 1
+    assert not list(scratch.iterdir())
+
+
+# ---------------------------------------------------------------- estimates and figures
+
+
+def guessing(scenario: Any, controller: Any) -> Assembly:
+    return assemble(scenario, controller, sensor=Guess())
+
+
+def figures(folder: Path) -> dict[str, Any]:
+    """metrics.json without what the clock on the wall decides."""
+    metrics: dict[str, Any] = json.loads((folder / "metrics.json").read_text())
+    for run in metrics["runs"].values():
+        del run["wall_time_s"], run["real_time_factor"]
+    return metrics
+
+
+def test_estimates_count_from_the_first_full_window_on(tmp_path: Path) -> None:
+    outcome = execute(
+        load(write_scenario(tmp_path, surface=BUMPS)), tmp_path / "out", None, guessing
+    )
+    record = outcome.runs[0].recorder
+    estimate, truth = record.group("estimate"), record.group("truth")
+    first = WINDOW - 1
+    assert np.isnan(estimate[:first]).all()
+    assert np.isfinite(estimate[first:]).all()
+    np.testing.assert_array_equal(record.group("valid")[:, 0], np.arange(record.rows) >= first)
+    found = outcome.runs[0].figures
+    assert found["valid_samples"] == record.rows - first
+    errors = (estimate - truth)[first:]
+    assert found["network"]["overall"]["rmse_m_s"] == pytest.approx(np.sqrt(np.mean(errors**2)))
+    assert found["network"]["RL"]["rmse_m_s"] == pytest.approx(np.sqrt(np.mean(errors[:, 2] ** 2)))
+    header, *rows = (tmp_path / "out" / "signals.csv").read_text().splitlines()
+    column = header.split(",").index("VRel.FL [m/s]")
+    written = [row.split(",")[column] for row in rows]
+    assert written[:first] == ["nan"] * first
+    assert "nan" not in written[first:]
+
+
+def test_a_sensor_that_is_never_valid_has_no_figures(tmp_path: Path) -> None:
+    scenario = load(write_scenario(tmp_path, duration="0.1"))
+    outcome = execute(scenario, tmp_path / "out", None, guessing)
+    found = outcome.runs[0].figures
+    assert found["valid_samples"] == 0
+    assert "network" not in found
+
+
+# ---------------------------------------------------------------- the same scenario, the same bytes
+
+
+@pytest.fixture(scope="module")
+def closed_loop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three controllers on a random road; `results` below the scenario's folder."""
+    folder = tmp_path_factory.mktemp("closed_loop")
+    path = write_scenario(
+        folder,
+        duration="2.5",
+        surface="{kind: iso8608, class: C}",
+        controllers=CLOSED_LOOP,
+        more="seed: 7",
+    )
+    execute(load(path), folder / "results", None, guessing)
+    return path
+
+
+LABELS = ("passive", "skyhook_truth", "skyhook_estimate")
+
+
+def test_the_same_scenario_gives_the_same_bytes(
+    closed_loop: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the road made once more, too."""
+    monkeypatch.setenv("COSIM_CACHE_DIR", str(tmp_path / "roads"))
+    execute(load(closed_loop), tmp_path / "again", None, guessing)
+    first = closed_loop.parent / "results"
+    for label in LABELS:
+        signals = [(f / label / "signals.csv").read_bytes() for f in (first, tmp_path / "again")]
+        assert signals[0] == signals[1]
+    assert figures(first) == figures(tmp_path / "again")
+    assert len(list((tmp_path / "roads").iterdir())) == 1
+
+
+def test_a_controller_alone_does_what_it_does_among_others(
+    closed_loop: Path, tmp_path: Path
+) -> None:
+    alone = load(closed_loop, ["controllers=[{kind: skyhook, feedback: truth}]"])
+    execute(alone, tmp_path, None, guessing)
+    among = closed_loop.parent / "results" / "skyhook_truth" / "signals.csv"
+    assert (tmp_path / "signals.csv").read_bytes() == among.read_bytes()
+
+
+def test_another_seed_is_another_road(closed_loop: Path, tmp_path: Path) -> None:
+    other = load(closed_loop, ["seed=8", "controllers=[{kind: passive}]"])
+    execute(other, tmp_path, None, guessing)
+    first = closed_loop.parent / "results" / "passive" / "signals.csv"
+    assert (tmp_path / "signals.csv").read_bytes() != first.read_bytes()
+
+
+def test_both_standards_drive_the_same_lap(closed_loop: Path, tmp_path: Path) -> None:
+    other = load(closed_loop, ["vehicle.fmi_version=2", "controllers=[{kind: passive}]"])
+    execute(other, tmp_path, None, guessing)
+    first = closed_loop.parent / "results" / "passive" / "signals.csv"
+    assert (tmp_path / "signals.csv").read_bytes() == first.read_bytes()
+
+
+def test_controllers_differ_only_from_when_they_may_act(closed_loop: Path) -> None:
+    """All begin on the same road at the same speed; skyhook on the truth acts from the start."""
+    results = closed_loop.parent / "results"
+    tables = {
+        label: np.genfromtxt(results / label / "signals.csv", delimiter=",", skip_header=1)
+        for label in LABELS
+    }
+    head = (results / "passive" / "signals.csv").read_text().splitlines()[0].split(",")
+    rear = head.index("Car.SuspControl.DamperRL.CtrlOut")
+    assert (tables["passive"][:, rear] == 0).all()
+    assert (tables["skyhook_estimate"][: WINDOW - 1, rear] == 0).all()
+    for label in LABELS[1:]:
+        command = tables[label][:, rear]
+        assert command.min() >= 0.0
+        assert command.max() > 0.5
+        assert not np.array_equal(tables[label], tables["passive"])
+
+
+def test_telling_progress_changes_nothing(tmp_path: Path) -> None:
+    told = []
+    path = write_scenario(tmp_path, surface=BUMPS)
+    first, second = build(path, Guess()), build(path, Guess())
+    first.run(None)
+    second.run(lambda done, total: told.append(done))
+    assert told
+    runs = [a.recorder.write(tmp_path / n).read_bytes() for a, n in ((first, "a"), (second, "b"))]
+    assert runs[0] == runs[1]
