@@ -72,9 +72,9 @@ static void energy_outputs(Variables *v, const Vehicle *c, const State *x, const
     double stored = kinetic_energy(v, c, x, w) + suspension_energy(v, c, x) + c->body_mass * g * x->position.z;
     for (int i = 0; i < CORNERS; ++i) {
         const Vec hub = add(x->position, to_inertial(w->R, w->corner[i].r));
-        const double deflection = fmax(w->contact[i].deflection, 0), twist = x->brake_windup[i];
+        const double deflection = fmax(w->contact[i].deflection, 0);
         stored += c->carrier_mass * g * hub.z + v->Tire_Stiffness * deflection * deflection / 2;
-        stored += v->PT_ShaftStiffness[i] * x->windup[i] * x->windup[i] / 2 + v->Brake_Stiffness * twist * twist / 2;
+        stored += v->PT_ShaftStiffness[i] * x->windup[i] * x->windup[i] / 2; /* the brakes' counts as dissipated */
     }
     v->Energy_Stored = stored;
     v->Energy_Dissipated = x->dissipated;

@@ -95,5 +95,7 @@ void tyre_forces(const Variables *p, const Vehicle *c, const State *x, Work *w, 
     y->Fy = clamp(f.Fy + (p->Tire_CarcassDampingY + extra) * y->stretch_y_rate, -f.peak_y, f.peak_y);
     y->Mz = f.Mz;
     y->My = -p->Tire_QSY1 * c->radius[i] * y->Fz * clamp(x->spin[i] * y->rolling_radius / 0.1, -1, 1);
-    y->dissipation = damper * t->deflection_rate - y->Fx * V_sx - y->Fy * V_sy - y->My * x->spin[i];
+    /* Rotation about the normal; a cambered wheel's spin has a part in it. */
+    const double turn = dot(k->rate, t->normal) + x->spin[i] * t->sine_inclination;
+    y->dissipation = damper * t->deflection_rate - y->Fx * V_sx - y->Fy * V_sy - y->My * x->spin[i] - y->Mz * turn;
 }
