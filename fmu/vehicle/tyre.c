@@ -54,7 +54,8 @@ static Forces magic_formula(const Variables *p, double Fz, double kappa, double 
 
     const double ratio = Kx * kappa / Ky;
     const double equivalent = sign * atan(sqrt(tan_alpha * tan_alpha + ratio * ratio)); /* combined slip, eq. 4.E */
-    const double trail = Fz * p->Tire_QDZ1 * p->Tire_Radius / Fz0 * cos(p->Tire_QCZ1 * shape(p->Tire_QBZ1, p->Tire_QEZ1, equivalent)) /
+    const double Bt = p->Tire_QBZ1 / (p->Tire_FrictionY * p->Road_Friction); /* eq. 4.E40: less friction, same shape at less slip */
+    const double trail = Fz * p->Tire_QDZ1 * p->Tire_Radius / Fz0 * cos(p->Tire_QCZ1 * shape(Bt, p->Tire_QEZ1, equivalent)) /
                          sqrt(1 + tan_alpha * tan_alpha);
     f.Fy = side * Fy;
     f.Mz = -trail * f.Fy;
@@ -65,6 +66,14 @@ static Forces magic_formula(const Variables *p, double Fz, double kappa, double 
 static double stretch_rate(double slip, double limit, double V_slip, double V_x) {
     const double rate = -V_slip - fabs(V_x) * slip;
     return (slip >= limit && rate > 0) || (slip <= -limit && rate < 0) ? 0.0 : rate;
+}
+
+/* Carcass damping may not take the pair of forces out of the friction ellipse where the formula's own do not go. */
+static void stay_in_ellipse(Tyre *y, const Forces *f) {
+    const double used_x = y->Fx / f->peak_x, used_y = y->Fy / f->peak_y, own_x = f->Fx / f->peak_x, own_y = f->Fy / f->peak_y;
+    const double usage = sqrt(used_x * used_x + used_y * used_y);
+    const double most = fmax(1, sqrt(own_x * own_x + own_y * own_y));
+    if (usage > most) y->Fx *= most / usage, y->Fy *= most / usage;
 }
 
 void tyre_forces(const Variables *p, const Vehicle *c, const State *x, Work *w, int i) {
@@ -93,6 +102,7 @@ void tyre_forces(const Variables *p, const Vehicle *c, const State *x, Work *w, 
     const double extra = p->Tire_StandstillDamping * fade * fade * (3 - 2 * fade);
     y->Fx = clamp(f.Fx + (p->Tire_CarcassDampingX + extra) * y->stretch_x_rate, -f.peak_x, f.peak_x);
     y->Fy = clamp(f.Fy + (p->Tire_CarcassDampingY + extra) * y->stretch_y_rate, -f.peak_y, f.peak_y);
+    stay_in_ellipse(y, &f);
     y->Mz = f.Mz;
     y->My = -p->Tire_QSY1 * c->radius[i] * y->Fz * clamp(x->spin[i] * y->rolling_radius / 0.1, -1, 1);
     /* Rotation about the normal; a cambered wheel's spin has a part in it. */
