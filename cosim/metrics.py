@@ -26,6 +26,7 @@ ERROR_FIGURES: Final = (
 COMFORT_FIGURES: Final = ("weighted_acceleration_m_s2", "deflection_rms_m", "tyre_load_rms_n")
 RUN_FIGURES: Final = (
     "lap_time_s",
+    "largest_deviation_m",
     "simulated_s",
     "wall_time_s",
     "real_time_factor",

@@ -69,9 +69,9 @@ def _unfit(variable: object, value: Value, unit: str | None) -> str | None:
         return f"is of type {declared}; only real, whole, Boolean and text parameters can be set"
     wants = {"Boolean": (bool, "true or false"), "String": (str, "text")}.get(kind)
     if wants is not None:
-        return None if isinstance(value, wants[0]) else f"= {value!r} must be {wants[1]}"
+        return None if isinstance(value, wants[0]) else f"= {_shown(value)} must be {wants[1]}"
     if isinstance(value, bool | str):
-        return f"= {value!r} must be a number"
+        return f"= {_shown(value)} must be a number"
     if kind == "Integer" and value != int(value):
         return f"= {value:g} must be a whole number"
     low, high = getattr(variable, "min", None), getattr(variable, "max", None)
@@ -81,3 +81,8 @@ def _unfit(variable: object, value: Value, unit: str | None) -> str | None:
     if high is not None and value > float(high):
         return f"= {value:g}{shown} is above its greatest value {float(high):g}{shown}"
     return None
+
+
+def _shown(value: Value) -> str:
+    """Return a value as YAML writes it."""
+    return str(value).lower() if isinstance(value, bool) else repr(value)

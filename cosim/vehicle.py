@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -65,7 +64,7 @@ class Vehicle:
         self._slave = Slave(
             description, [w.variable for w in wiring.inputs], [w.variable for w in wiring.outputs]
         )
-        self._zeros = np.zeros(len(wiring.outputs))
+        self._finite = np.empty(len(wiring.outputs), dtype=np.bool_)
         self._values = np.full(len(CHANNEL_QUANTITIES) + len(TRUTH) + len(RECORDED), np.nan)
         self._prepare_outputs(wiring.outputs)
         self._prepare_inputs(wiring.inputs)
@@ -104,7 +103,8 @@ class Vehicle:
         inputs.
         """
         outputs = self._slave.outputs
-        if math.isfinite(outputs.dot(self._zeros)):  # NaN or infinity times zero is NaN
+        np.isfinite(outputs, out=self._finite)
+        if self._finite.all():
             return
         for name, value in zip(self._slave.output_names, outputs, strict=True):
             if not np.isfinite(value):

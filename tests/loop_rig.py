@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -43,19 +44,16 @@ def write_scenario(
     duration: str = "1",
     length_m: float = 150,
     surface: str = "{kind: smooth}",
-    driver: str = "{speed_kmh: 50}",
-    more: str = "",
-    **sections: str,
+    sections: Mapping[str, str] | None = None,
+    name: str = "scenario",
 ) -> Path:
     """Write a scenario on the straight track to `folder`; `sections` are YAML by field name."""
-    lines = [
-        "name: a straight road",
-        f"duration: {duration}",
-        f"road: {{track: straight, length_m: {length_m}, surface: {surface}}}",
-        f"driver: {driver}",
-        *(f"{name}: {text}" for name, text in sections.items()),
-        more,
-    ]
-    path = folder / "scenario.yaml"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    fields = {
+        "name": "a straight road",
+        "duration": duration,
+        "road": f"{{track: straight, length_m: {length_m}, surface: {surface}}}",
+        "driver": "{speed_kmh: 50}",
+    } | dict(sections or {})
+    path = folder / f"{name}.yaml"
+    path.write_text("".join(f"{key}: {text}\n" for key, text in fields.items()), encoding="utf-8")
     return path

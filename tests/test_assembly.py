@@ -20,23 +20,26 @@ from sensor import SensorError
 SHORT = "0.05"
 
 
-def build(folder: Path, duration: str = SHORT, number: int = 0, **sections: str) -> Assembly:
+def assembled(folder: Path, duration: str, sections: dict[str, str]) -> Assembly:
+    scenario = load(write_scenario(folder, duration=duration, sections=sections))
+    return assemble(scenario, scenario.controllers[0], sensor=Blind())
+
+
+def build(folder: Path, duration: str = SHORT, **sections: str) -> Assembly:
     """The blocks of a short run, its FMU already freed."""
-    scenario = load(write_scenario(folder, duration=duration, **sections))
-    built = assemble(scenario, scenario.controllers[number], sensor=Blind())
+    built = assembled(folder, duration, sections)
     built.vehicle.close()
     return built
 
 
 def complaints(folder: Path, **sections: str) -> list[str]:
     with pytest.raises(InputError) as caught:
-        build(folder, **sections)
+        assembled(folder, SHORT, sections)
     return [str(problem) for problem in caught.value.problems]
 
 
 def driven(folder: Path, duration: str = SHORT, **sections: str) -> Assembly:
-    scenario = load(write_scenario(folder, duration=duration, **sections))
-    built = assemble(scenario, scenario.controllers[0], sensor=Blind())
+    built = assembled(folder, duration, sections)
     built.run(None)
     return built
 
@@ -121,12 +124,10 @@ def test_the_car_starts_on_the_track_at_the_profiles_speed(tmp_path: Path) -> No
     assert car.recorder.group("channels")[0, 6] == pytest.approx(10.0)
 
 
-def test_a_road_without_a_speed_limit(tmp_path: Path) -> None:
-    """Either there is a speed to start with, or the scenario is told that it needs one."""
-    try:
-        build(tmp_path, driver="{style: normal}")
-    except InputError as error:
-        assert "speed_kmh" in str(error)
+def test_a_road_without_a_speed_limit_needs_one(tmp_path: Path) -> None:
+    (complaint,) = complaints(tmp_path, driver="{style: normal}")
+    assert "scenario.yaml:4:1: the straight road has no speed limit" in complaint
+    assert "driver.speed_kmh" in complaint
 
 
 def test_a_road_file_that_is_none_is_shown_in_place(tmp_path: Path) -> None:
@@ -164,7 +165,9 @@ def test_a_lap_that_is_given_up_says_so(tmp_path: Path) -> None:
     """A parrot does not get anywhere: its x is its steering-wheel angle."""
     parrot(tmp_path / "p.fmu", (*own_variables().values(), Variable("Echo", ECHO)))
     vehicle = "{fmu: p.fmu, variables: {Car.tx: {name: Echo}}}"
-    scenario = load(write_scenario(tmp_path, duration="lap", length_m=20, vehicle=vehicle))
+    scenario = load(
+        write_scenario(tmp_path, duration="lap", length_m=20, sections={"vehicle": vehicle})
+    )
     result = assemble(scenario, scenario.controllers[0], sensor=Blind()).run(None)
     assert result.lap_time_s is None
     assert "duration" not in result.finish_reason
@@ -199,7 +202,7 @@ def test_passive_dampers_are_the_fmus_own_curve(tmp_path: Path) -> None:
 
 def test_skyhook_starts_with_its_initial_command(tmp_path: Path) -> None:
     controllers = "[{kind: skyhook, feedback: estimate, initial_command: 0.3}]"
-    scenario = load(write_scenario(tmp_path, duration="0.5", controllers=controllers))
+    scenario = load(write_scenario(tmp_path, duration="0.5", sections={"controllers": controllers}))
     built = assemble(scenario, scenario.controllers[0], sensor=Guess())
     built.run(None)
     np.testing.assert_array_equal(built.recorder.group("command")[:18], 0.3)
@@ -208,7 +211,7 @@ def test_skyhook_starts_with_its_initial_command(tmp_path: Path) -> None:
 
 def test_a_network_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "n.onnx").write_text("no network")
-    scenario = load(write_scenario(tmp_path, sensor="{network: n.onnx}"))
+    scenario = load(write_scenario(tmp_path, sections={"sensor": "{network: n.onnx}"}))
     with pytest.raises(NetworkError, match=r"n\.onnx"):
         assemble(scenario, scenario.controllers[0])
 

@@ -1,10 +1,11 @@
-"""The driver: speed profiles against closed forms, laps, stops, slopes (cosim.driver and others)."""
+"""The driver and his speed profiles: closed forms, laps, stops, slopes."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -104,7 +105,7 @@ def test_who_may_accelerate_more_is_nowhere_slower(name: str) -> None:
     profiles = [
         speed_profile(track, STYLES[style]) for style in ("aggressive", "normal", "defensive")
     ]
-    for faster, slower in zip(profiles, profiles[1:], strict=False):
+    for faster, slower in pairwise(profiles):
         assert (faster >= slower - 1e-9).all()
         assert travel_time(track, faster) < travel_time(track, slower)
 
@@ -120,8 +121,8 @@ def test_limits_of_the_track_and_the_cap_hold(name: str) -> None:
 
 
 def test_a_profile_does_not_know_left_from_right() -> None:
-    profiles = [speed_profile(bend(50.0, left), NORMAL) for left in (True, False)]
-    np.testing.assert_allclose(*profiles, rtol=1e-12)
+    left, right = (speed_profile(bend(50.0, to_the_left), NORMAL) for to_the_left in (True, False))
+    np.testing.assert_allclose(left, right, rtol=1e-12)
 
 
 def test_who_brakes_as_he_accelerates_drives_the_same_both_ways() -> None:
@@ -260,7 +261,8 @@ def drive(
     pose = track.pose(0.0)
     start: dict[str, Value] = {
         "Init.x": pose.x, "Init.y": pose.y + y, "Init.Yaw": pose.heading, "Damp.Passive": True,
-        "Init.Velocity": at(track, speed, 0.0), "Road.File": str(build_road(track, Smooth(), folder)),
+        "Init.Velocity": at(track, speed, 0.0),
+        "Road.File": str(build_road(track, Smooth(), folder)),
     }  # fmt: skip
     vehicle = Vehicle(Description(builtin_fmu()), own_wiring(), start, STEP_S)
     driver = PathDriver(track, speed, STEP_S)
@@ -327,12 +329,17 @@ def test_a_car_beside_the_line_comes_back_to_it(tmp_path: Path) -> None:
     assert aside.min() > -0.1  # without swinging through
 
 
-def standing(done: Drive) -> tuple[float, Array]:
-    """Length of the longest standstill [s] and the places during it [m]."""
-    still = np.concatenate([[False], np.abs(done.speed) < 0.05, [False]])
-    (edges,) = np.nonzero(np.diff(still.astype(int)))
-    begin, end = max(zip(edges[::2], edges[1::2], strict=True), key=lambda span: span[1] - span[0])
-    return (end - begin) * STEP_S, done.x[begin:end]
+def standing(done: Drive, line: float) -> tuple[float, Array]:
+    """How long the car stays where it stops before a line [s], and where it is meanwhile [m].
+
+    After the stop the body rocks to and fro by some centimetres, so the place counts and not the
+    speed.
+    """
+    near = (done.x > line - 3.0) & (done.x < line + 1.0)
+    place = float(np.median(done.x[near & (np.abs(done.speed) < 0.01)]))
+    (still,) = np.nonzero(np.abs(done.x - place) < 0.06)
+    assert len(still) == still[-1] - still[0] + 1  # he stops once, and does not come back
+    return len(still) * STEP_S, done.x[still]
 
 
 FLAT: Knots = ((0.0, 0.0),)
@@ -353,14 +360,12 @@ def test_he_stops_at_the_line_waits_and_leaves_again(
     line = 80.0
     track = straight(140.0, Stop(line, WAIT), grade=grade)
     done = drive(track, STYLES[style], tmp_path, cap=12.0)
-    waited, places = standing(done)
+    waited, places = standing(done, line)
     assert done.finished
     assert WAIT <= waited < WAIT + 1.0
-    assert line - 2.0 < places.min() * track.length / track.length  # x is s but for the slope's cosine
+    assert line - 1.5 < places.min()
     assert places.max() < line + 0.3
-    assert np.ptp(places) < 0.05
-    leaving = done.x[np.argmax(done.x > places.max()) :]
-    assert leaving.min() > places.min() - 0.1  # he does not roll back
+    assert (np.diff(done.x) > -0.01).all()  # he does not roll back
     assert done.time_s < done.expected_s + 5.0
     assert done.largest_deviation < 0.05
 
@@ -370,19 +375,19 @@ def test_a_line_may_be_anywhere_between_two_points_of_the_track(
     tmp_path: Path, line: float
 ) -> None:
     done = drive(straight(100.0, Stop(line, WAIT)), NORMAL, tmp_path, cap=12.0)
-    waited, places = standing(done)
+    waited, places = standing(done, line)
     assert done.finished
     assert waited >= WAIT
-    assert line - 2.0 < places.mean() < line + 0.3
+    assert line - 1.5 < places.mean() < line + 0.3
 
 
 def test_two_stops_one_after_the_other(tmp_path: Path) -> None:
     track = straight(120.0, Stop(50.0, 1.0), Stop(70.0, 2.0))
     done = drive(track, NORMAL, tmp_path, cap=12.0)
-    still = done.x[np.abs(done.speed) < 0.03]
     assert done.finished
     for line, wait in track.stops:
-        assert ((still > line - 2.0) & (still < line + 0.3)).sum() * STEP_S >= 0.9 * wait
+        waited, _ = standing(done, line)
+        assert wait <= waited < wait + 1.0
 
 
 @pytest.mark.parametrize("grade", GRADES)

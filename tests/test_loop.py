@@ -178,7 +178,7 @@ def parrot_scenario(folder: Path, orders: str = "", **sections: str) -> Path:
     parrot(folder / "p.fmu", (*own_variables().values(), *echoes))
     mapping = "{Car.ax: {name: Echo.Steer}, Car.ay: {name: Echo.FL}}"
     vehicle = f"{{fmu: p.fmu, variables: {mapping}, parameters: {{{orders}}}}}"
-    return write_scenario(folder, vehicle=vehicle, **sections)
+    return write_scenario(folder, sections={"vehicle": vehicle, **sections})
 
 
 def build(path: Path, sensor: SensorBlock, dampers: ControllerBlock | None = None) -> Assembly:
@@ -311,8 +311,7 @@ def closed_loop(tmp_path_factory: pytest.TempPathFactory) -> Path:
         folder,
         duration="2.5",
         surface="{kind: iso8608, class: C}",
-        controllers=CLOSED_LOOP,
-        more="seed: 7",
+        sections={"controllers": CLOSED_LOOP, "seed": "7"},
     )
     execute(load(path), folder / "results", None, guessing)
     return path

@@ -83,7 +83,7 @@ def test_all_problems_at_once_each_at_its_place(tmp_path):
     assert messages[1].endswith("not 'hockenhiem'; did you mean 'hockenheim'?")
     assert messages[2] == "'sped_kmh' is not a field of driver; did you mean 'speed_kmh'?"
     assert messages[3] == "driver.speed_kmh must be greater than 0 km/h, not 0 km/h"
-    assert "must be one number" in messages[4]
+    assert "must be one finite number" in messages[4]
     assert "there is no file" in messages[5]
     assert messages[6].endswith("not 'skyhok'; did you mean 'skyhook'?")
     assert messages[7].endswith("did you mean 'network.overall.rmse_m_s'?")
@@ -118,7 +118,7 @@ def test_a_field_in_the_wrong_section_is_sent_to_the_right_one(tmp_path):
         (GOOD + "controllers: [{kind: passive}, {kind: passive}]\n", "two runs are called"),
         (GOOD + "paper_row: Rural track, Normal diver\n", "'Rural track, Normal driver'"),
         (GOOD + "vehicle: {fmu: my.fmi}\n", "'builtin' or an FMU (.fmu)"),
-        (GOOD + "vehicle: {parameters: {Body.Mass: [1]}}\n", "must be one number"),
+        (GOOD + "vehicle: {parameters: {Body.Mass: [1]}}\n", "must be one finite number"),
         (GOOD + "seed: true\n", "seed must be a whole number, not true"),
         (GOOD + "seed: 1.5\n", "seed must be a whole number, not 1.5"),
         (GOOD + "  speed_kmh: .inf\n", "driver.speed_kmh must be"),

@@ -4,25 +4,21 @@ from functools import cache
 
 import numpy as np
 import pytest
+from vehicle_grip import cornering_stiffness, pneumatic_trail
 from vehicle_linear import ROLL, SIDE, TRAVEL, LinearCar, per_corner
 from vehicle_rig import (
     BRAKE,
-    FRICTION,
     GAS,
     STEER,
     Array,
     Cruise,
-    Drive,
     G,
     Record,
     Rig,
-    each,
     parameter,
     run,
     steer_to,
 )
-
-from cosim.fmi import Value
 
 LEFT, RIGHT = [0, 2], [1, 3]
 FRONT, REAR = slice(0, 2), slice(2, 4)
@@ -133,10 +129,11 @@ def understeer_gradient() -> float:
     roll steer.
     """
     car = LinearCar()
-    p, load = car.steady_turn(), car.loads / parameter("Tire.NominalLoad")
-    peak = 2.0 * np.arctan(load / parameter("Tire.PKY2"))
-    stiffness = -parameter("Tire.PKY1") * parameter("Tire.NominalLoad") * np.sin(peak)
-    trail = parameter("Tire.QDZ1") * parameter("Tire.Radius") * load
+    p, stiffness, trail = (
+        car.steady_turn(),
+        cornering_stiffness(car.loads),
+        pneumatic_trail(car.loads),
+    )
     a, b = parameter("Body.CogToFront"), parameter("Body.CogToRear")
     shift = float(trail.mean())  # the aligning moments' share in the balance about z
     axle = parameter("Body.Mass") * np.array([b + shift, a - shift]) / (a + b)
@@ -152,22 +149,22 @@ def understeer_gradient() -> float:
     return float(slip[0] - slip[1] - rack - front + rear)
 
 
-def test_understeer_gradient() -> None:
-    record = slow_ramp(27.0, 2.0, 15.0)
-    wheelbase = parameter("Body.CogToFront") + parameter("Body.CogToRear")
-    hand = record["Steer.WhlAng"] / parameter("Steer.Ratio")
-    extra = hand - wheelbase * record["Car.YawRate"] / record["Car.vx"]
-    assert slope(record, extra, 0.2, 0.8) == pytest.approx(understeer_gradient(), rel=0.08)
-    everyday = np.degrees(G * slope(record, extra, 1.0, 4.0))  # [deg/g]
-    assert 1.5 < everyday < 4.0
-    assert np.degrees(G * slope(slow_ramp(22.2, 8.0, 25.0), _extra(22.2), 5.0, 6.0)) > everyday
-
-
-def _extra(speed: float) -> Array:
-    record = slow_ramp(speed, 8.0, 25.0)
+def extra_steer(record: Record) -> Array:
+    """Hand wheel over ratio less the Ackermann angle [rad]."""
     wheelbase = parameter("Body.CogToFront") + parameter("Body.CogToRear")
     hand = record["Steer.WhlAng"] / parameter("Steer.Ratio")
     return np.asarray(hand - wheelbase * record["Car.YawRate"] / record["Car.vx"])
+
+
+def test_understeer_gradient() -> None:
+    slow, limit = slow_ramp(27.0, 2.0, 15.0), slow_ramp(22.2, 8.0, 25.0)
+    at_first = slope(slow, extra_steer(slow), 0.2, 0.8)
+    assert at_first == pytest.approx(understeer_gradient(), rel=0.08)
+    everyday, late = (
+        np.degrees(G * slope(record, extra_steer(record), low, high))  # [deg/g]
+        for record, low, high in ((slow, 1.0, 4.0), (limit, 5.0, 6.0))
+    )
+    assert 1.5 < everyday < late < 4.0
 
 
 def test_largest_lateral_acceleration() -> None:
@@ -185,123 +182,3 @@ def test_tyres_carry_the_lateral_acceleration() -> None:
     force = (fy * np.cos(steer) + fx * np.sin(steer)).sum(axis=1)
     needed = parameter("Body.Mass") * record["Car.ay"] * np.cos(record["Car.Roll"])
     assert force[500:] == pytest.approx(needed[500:], rel=0.005)
-
-
-# ---------------------------------------------------------------- braking and driving
-
-
-NO_ANTIS: dict[str, Value] = {
-    k: v
-    for name in ("Recession", "RecessionCurve", "KnucklePitch")
-    for k, v in each(f"Kin.{name}@", 0.0).items()
-}
-
-
-def pedal(index: int, value: float) -> Drive:
-    def drive(rig: Rig) -> None:
-        rig.inputs[index] = value if rig.k >= 50 else 0.0
-
-    return drive
-
-
-def settled(start: dict[str, Value], command: Drive) -> tuple[float, float, Array]:
-    """Mean ax [g], and pitch [rad] and travels [m] over those of straight running, settled."""
-    record = run(2.8, {"Damp.Passive": True, **start}, command)
-    window = slice(200, 281)
-    pitch, travel = from_rest(record, "Car.Pitch"), from_rest(record, "Car.C@.q0")
-    return (
-        float(record["Car.ax"][window].mean() / G),
-        float(pitch[window].mean()),
-        np.asarray(travel[window].mean(axis=0)),
-    )
-
-
-def test_anti_dive_and_anti_lift() -> None:
-    start: dict[str, Value] = {"Init.Velocity": 25.0}
-    with_kinematics = settled(start, pedal(BRAKE, 0.43))
-    without = settled(start | NO_ANTIS, pedal(BRAKE, 0.43))
-    assert with_kinematics[0] == pytest.approx(-0.5, abs=0.02)
-    assert without[0] == pytest.approx(with_kinematics[0], rel=0.01)
-    assert 0.7 < with_kinematics[1] / without[1] < 0.85  # nose down, but less
-    assert without[1] > np.radians(1.0)
-    less = 1.0 - with_kinematics[2] / without[2]
-    assert less[FRONT] == pytest.approx([0.25] * 2, abs=0.06)  # the design's 25 and 35 %
-    assert less[REAR] == pytest.approx([0.35] * 2, abs=0.06)
-
-
-def test_anti_squat() -> None:
-    start: dict[str, Value] = {"Init.Velocity": 10.0}
-    with_kinematics = settled(start, pedal(GAS, 0.6))
-    without = settled(start | NO_ANTIS, pedal(GAS, 0.6))
-    less = 1.0 - with_kinematics[2] / without[2]
-    assert less[REAR] == pytest.approx([0.30] * 2, abs=0.06)
-    assert with_kinematics[1] < 0.0  # nose up
-
-
-def test_longitudinal_load_transfer() -> None:
-    """The tyres' forces act on the body a little below the road: by rolling less loaded radius."""
-    record = run(2.8, {"Init.Velocity": 25.0, "Damp.Passive": True}, pedal(BRAKE, 0.43))
-    window = slice(200, 281)
-    front = from_rest(record, "Car.Fz@")[window, FRONT].sum(axis=1).mean()
-    wheelbase = parameter("Body.CogToFront") + parameter("Body.CogToRear")
-    force = from_rest(record, "Car.Fx@")[window].sum(axis=1).mean()
-    lever = (
-        parameter("Body.CogHeight") + parameter("Wheel.KinematicRadius") - LinearCar().radius.mean()
-    )
-    assert front == pytest.approx(-force * lever / wheelbase, rel=0.05)
-
-
-@pytest.mark.parametrize("active", [True, False])
-def test_slip_control(active: bool) -> None:
-    def drive(rig: Rig) -> None:
-        rig.inputs[BRAKE], rig.inputs[FRICTION] = 1.0, 0.3
-
-    start = {"Init.Velocity": 20.0, "SlipControl.Active": active, "Road.Friction": 0.3}
-    record = run(4.0, start, drive)
-    assert np.isfinite(record.rows).all()
-    rolling = record["Car.vx"] > 10.0
-    slip = record.corners("Car.LongSlip@")[rolling][50:]
-    if active:
-        assert slip.min() > -0.5
-        assert (record.corners("Car.WheelSpd_@")[rolling] > 5.0).all()
-    else:
-        assert (slip.min(axis=0) < -0.99).all()  # locked
-        assert np.abs(record.corners("Car.WheelSpd_@")[150]).max() < 1.0
-    assert record["Car.ax"].min() / G > -0.3 * 1.3  # no more than the road gives
-
-
-def test_slip_control_stops_shorter() -> None:
-    def drive(rig: Rig) -> None:
-        rig.inputs[BRAKE], rig.inputs[FRICTION] = 1.0, 0.3
-
-    runs = [
-        run(4.0, {"Init.Velocity": 20.0, "SlipControl.Active": on, "Road.Friction": 0.3}, drive)
-        for on in (True, False)
-    ]
-    assert runs[0]["Car.vx"][-1] < runs[1]["Car.vx"][-1] - 2.0
-
-
-def test_full_throttle_spins_without_slip_control() -> None:
-    def drive(rig: Rig) -> None:
-        rig.inputs[GAS], rig.inputs[FRICTION] = 1.0, 0.3
-
-    start: dict[str, Value] = {"Init.Velocity": 15.0, "Road.Friction": 0.3}
-    held = run(2.0, start, drive).corners("Car.LongSlip@").max()
-    spun = run(2.0, {**start, "SlipControl.Active": False}, drive).corners("Car.LongSlip@").max()
-    assert held < 0.35
-    assert spun > 0.9
-
-
-def test_friction_scales_the_limit() -> None:
-    def drive(rig: Rig) -> None:
-        rig.inputs[BRAKE] = 1.0
-        rig.inputs[FRICTION] = rough
-
-    decelerations = []
-    for rough in (1.0, 0.5, 0.2):
-        record = run(1.5, {"Init.Velocity": 30.0, "Road.Friction": rough}, drive)
-        decelerations.append(float(-record["Car.ax"][50:150].mean() / G))
-    full, half, fifth = decelerations
-    assert 0.8 < full < 1.15
-    assert half == pytest.approx(0.5 * full, rel=0.25)
-    assert fifth == pytest.approx(0.2 * full, rel=0.4)

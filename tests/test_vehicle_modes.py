@@ -1,4 +1,4 @@
-"""The vehicle's small motions against an independent linearisation: rest, eigenfrequencies, response.
+"""The vehicle's small motions against an independent linearisation: rest, modes, response.
 
 On a road without grip the car is a holonomic system of which `vehicle_linear` writes down energy
 and inertia from the parameters alone; the FMU has to move as its eigenvalues say.
@@ -7,14 +7,16 @@ and inertia from the parameters alone; the FMU has to move as its eigenvalues sa
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
-from vehicle_linear import PITCH, ROLL, SIDE, TRAVEL, LinearCar, Z, per_corner
+from vehicle_grip import GripCar
+from vehicle_linear import PITCH, ROLL, SIDE, TRAVEL, LinearCar, Y, Z, per_corner
 from vehicle_rig import (
     CORNERS,
-    G,
     NO_DRAG,
     NO_GRIP,
     Array,
+    G,
     Record,
     Rig,
     cosine_bump,
@@ -92,7 +94,7 @@ def free_response(folder: Path, kinematics: bool) -> Record:
         return cosine_bump(s, 5.0, 3.0, 0.0008) + short * left + long * right
 
     road = straight_road(folder / "bumps.crg", bumps, columns=TWO_SIDES, length=200.0)
-    start = {
+    start: dict[str, Value] = {
         "Init.Velocity": 10.0, "Init.x": -5.0, "Road.File": road, "Solver.Step": 0.25e-3,
         "Tire.Damping": 0.0, **each("Damp.Scale@", 0.0), **NO_GRIP, **NO_DRAG,
     }  # fmt: skip
@@ -125,63 +127,88 @@ FREQUENCIES = np.array(
 PHASES = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, len(FREQUENCIES))
 AMPLITUDES = 0.0002 / FREQUENCIES  # [m]: the car must stay linear and not lose speed
 DAMPING = (2450.0, 3250.0)
+LINEAR = LinearCar(np.repeat(DAMPING, 2), parameter("Tire.Damping"))
+Gains = dict[str, npt.NDArray[np.complex128]]
 
 
 def multisine_run(folder: Path, antisymmetric: bool, grip: bool) -> Record:
     def elevation(s: Array, v: Array) -> Array:
         waves = AMPLITUDES * np.cos(2.0 * np.pi * FREQUENCIES / SPEED * s + PHASES)
         one_side = waves.sum(axis=1, keepdims=True) * np.clip((s + 15.0) / 20.0, 0.0, 1.0)
-        return one_side * (np.sign(v) if antisymmetric else np.ones_like(v))
+        return np.asarray(one_side * (np.sign(v) if antisymmetric else np.ones_like(v)))
 
     road = straight_road(folder / "sines.crg", elevation, columns=TWO_SIDES, length=700.0)
-    start = {"Init.Velocity": SPEED, "Init.x": -18.0, "Road.File": road, **NO_DRAG}
+    start: dict[str, Value] = {
+        "Init.Velocity": SPEED,
+        "Init.x": -18.0,
+        "Road.File": road,
+        **NO_DRAG,
+    }
     start |= linear_dampers(*DAMPING) | ({} if grip else NO_GRIP)
     return run(32.0, start)
 
 
 def patch_gains(frequency: float) -> tuple[complex, complex]:
-    """What five points over the patch make of a wave: gains of mean height and fitted slope."""
-    place = parameter("Road.PatchLength") / 5.0 * np.arange(-2, 3)
-    wave = np.exp(2j * np.pi * frequency / SPEED * place)
+    """What the patch makes of a wave: gains of its mean height and of the slope fitted to it."""
+    k, half = 2.0 * np.pi * frequency / SPEED, 0.5 * parameter("Road.PatchLength")
     grid = np.sinc(frequency / SPEED * DS) ** 2  # linear between the road's cross sections
-    return grid * wave.mean(), grid * (place @ wave) / (place @ place)
+    mean = np.sin(k * half) / (k * half)
+    fitted = 3.0j * (mean - np.cos(k * half)) / (k * half**2)  # integrals of s exp(iks) and s^2
+    return complex(grid * mean), complex(grid * fitted)
 
 
-def gains(record: Record, names: dict[str, int], antisymmetric: bool) -> dict[str, Array]:
-    """Measured over analytic complex amplitudes of rates, shape (frequencies,) for each name."""
-    car = LinearCar(np.repeat(DAMPING, 2), parameter("Tire.Damping"))
+def gains(record: Record, names: dict[str, int], car: LinearCar | GripCar, side: Array) -> Gains:
+    """Measured over analytic complex amplitudes, shape (frequencies,) for each name.
+
+    `names` maps outputs to coordinates of p; `side` (4,) is the sign of the road under each wheel.
+    """
     window = slice(-round(PERIOD / 0.01) - 1, -1)
     t, x0 = record.t[window], record["Car.tx"][window][0]
     out: dict[str, list[complex]] = {name: [] for name in names}
     for f, amplitude, phase in zip(FREQUENCIES, AMPLITUDES, PHASES, strict=True):
         omega = 2.0 * np.pi * f
-        start = omega / SPEED * (x0 - SPEED * t[0] + car.hub[:, 0]) + phase
-        road = amplitude * np.exp(1j * start) * (SIDE if antisymmetric else 1.0)
+        start = omega / SPEED * (x0 - SPEED * t[0] + LINEAR.hub[:, 0]) + phase
+        road = amplitude * np.exp(1j * start) * side
         height, slope = patch_gains(f)
         p = car.response(omega, road * height, road * slope)
         for name, index in names.items():
             measured = 2.0 * np.mean(record[name][window] * np.exp(-1j * omega * t))
-            acceleration = name in ("Car.ax", "Car.ay", "Car.az")
-            out[name].append(measured / (p[index] * (1j * omega) ** (2 if acceleration else 1)))
+            order = 2 if name in ("Car.ay", "Car.az") else 1
+            out[name].append(complex(measured / (p[index] * (1j * omega) ** order)))
     return {name: np.array(values) for name, values in out.items()}
 
 
 TRAVELS = {f"Car.C{c}.q0p": TRAVEL + i for i, c in enumerate(CORNERS)}
 
 
-@pytest.mark.parametrize("antisymmetric", [False, True])
-def test_frequency_response(tmp_path: Path, antisymmetric: bool) -> None:
-    names = {"Car.RollVel": ROLL} if antisymmetric else {"Car.az": Z, "Car.PitchVel": PITCH}
-    record = multisine_run(tmp_path, antisymmetric, grip=False)
-    for name, ratio in gains(record, names | TRAVELS, antisymmetric).items():
+SYMMETRIC = {"Car.az": Z, "Car.PitchVel": PITCH} | TRAVELS
+
+
+def test_heave_and_pitch_response(tmp_path: Path) -> None:
+    record = multisine_run(tmp_path, antisymmetric=False, grip=False)
+    for name, ratio in gains(record, SYMMETRIC, LINEAR, np.ones(4)).items():
+        assert np.abs(ratio - 1.0).max() < 0.01, name
+
+
+def test_roll_response(tmp_path: Path) -> None:
+    record = multisine_run(tmp_path, antisymmetric=True, grip=False)
+    for name, ratio in gains(record, {"Car.RollVel": ROLL} | TRAVELS, LINEAR, SIDE).items():
         assert np.abs(ratio - 1.0).max() < 0.012, name
 
 
-def test_frequency_response_with_grip(tmp_path: Path) -> None:
-    """Grip ties the wheels' fore-and-aft motion to the road; in the vertical it changes little."""
+def test_heave_and_pitch_response_with_grip(tmp_path: Path) -> None:
+    """Longitudinal grip, which the linear car leaves out, ties pitch to the wheels' inertia."""
     record = multisine_run(tmp_path, antisymmetric=False, grip=True)
-    for name, ratio in gains(record, {"Car.az": Z} | TRAVELS, False).items():
-        assert np.abs(ratio - 1.0).max() < 0.1, name
+    for name, ratio in gains(record, TRAVELS, GripCar(LINEAR, SPEED), np.ones(4)).items():
+        assert np.abs(ratio - 1.0).max() < 0.03, name
+
+
+def test_roll_response_with_grip(tmp_path: Path) -> None:
+    """Tyres that hold the car sideways change the roll altogether: less than half at 2.1 Hz."""
+    record = multisine_run(tmp_path, antisymmetric=True, grip=True)
+    names = {"Car.RollVel": ROLL, "Car.ay": Y} | TRAVELS
+    for name, ratio in gains(record, names, GripCar(LINEAR, SPEED), SIDE).items():
+        assert np.abs(ratio - 1.0).max() < 0.025, name
 
 
 def test_roll_stiffness_share() -> None:

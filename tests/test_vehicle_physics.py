@@ -23,6 +23,7 @@ from vehicle_rig import (
     straight_track,
 )
 
+from cosim.fmi import Value
 from cosim.road import Iso8608, build_road
 
 RATES = np.array([1.0, 1.3, 1.7, 2.1])  # of the four damper commands [Hz]
@@ -87,8 +88,8 @@ def test_mirror_symmetry(tmp_path: Path) -> None:
         for name in names:
             a, b = left[name], sign * right[name]
             assert np.abs(a - b).max() < 1e-9 * max(1.0, np.abs(a).max()), name
-    for names, sign in ((EVEN_CORNERS, 1.0), (ODD_CORNERS, -1.0)):
-        for name in names:
+    for patterns, sign in ((EVEN_CORNERS, 1.0), (ODD_CORNERS, -1.0)):
+        for name in patterns:
             a, b = left.corners(name), sign * right.corners(name)[:, SWAPPED]
             assert np.abs(a - b).max() < 1e-9 * max(1.0, np.abs(a).max()), name
 
@@ -106,7 +107,11 @@ def test_step_halving(rough: Callable[[str], str]) -> None:
     """Errors fall with the square of the step; at the default 1 ms v_rel is right to 1 %."""
 
     def at(step: float) -> Record:
-        start = {"Init.Velocity": 12.0, "Road.File": rough("B"), "Solver.Step": step}
+        start: dict[str, Value] = {
+            "Init.Velocity": 12.0,
+            "Road.File": rough("B"),
+            "Solver.Step": step,
+        }
         return run(6.0, start, slalom)
 
     exact = at(6.25e-5)
@@ -193,7 +198,7 @@ def test_stands_on_a_hill_and_rolls_when_let_go(hill: str, brake: float) -> None
     def drive(rig: Rig) -> None:
         rig.inputs[BRAKE] = brake if rig.k < 3000 else 0.0
 
-    start = {"Init.x": 50.0, "Road.File": hill, "DM.Brake": brake}
+    start: dict[str, Value] = {"Init.x": 50.0, "Road.File": hill, "DM.Brake": brake}
     record = run(33.0, start, drive)
     held = slice(0, 3001)
     for name in ("Car.tx", "Car.ty", "Car.tz"):
@@ -235,7 +240,7 @@ def test_comes_to_a_stop() -> None:
 def test_same_bits_from_both_fmi_versions_and_from_two_instances(
     rough: Callable[[str], str],
 ) -> None:
-    start = {"Init.Velocity": 12.0, "Road.File": rough("C")}
+    start: dict[str, Value] = {"Init.Velocity": 12.0, "Road.File": rough("C")}
     alone = run(5.0, start, slalom)
     assert np.array_equal(alone.rows, run(5.0, start, slalom, version=2).rows)
     with Rig(start) as first, Rig(start, version=2) as second:

@@ -187,10 +187,8 @@ def test_what_is_not_required_may_be_missing(version: int, tmp_path: Path) -> No
 
 
 def test_unknown_quantity_with_the_nearest(tmp_path: Path) -> None:
-    path = write_scenario(
-        tmp_path,
-        vehicle=f"{{fmu: {parrot(tmp_path / 'p.fmu')}, variables: {{Car.vxx: {{name: Car.vx}}}}}}",
-    )
+    vehicle = f"{{fmu: {parrot(tmp_path / 'p.fmu')}, variables: {{Car.vxx: {{name: Car.vx}}}}}}"
+    path = write_scenario(tmp_path, sections={"vehicle": vehicle})
     result = CliRunner().invoke(main, ["run", str(path), "--output-dir", str(tmp_path / "out")])
     assert "unknown quantity 'Car.vxx'; did you mean 'Car.vx'?" in result.stderr
     assert result.exit_code == 2
@@ -403,7 +401,9 @@ def test_another_fmu_in_the_vehicles_place_gives_the_same_bits(
     variables = renamed_vehicle(version, tmp_path / "other.fmu")
     parameters = "{" + ", ".join(f"{n}: {v}" for n, v in start.items()) + "}"
     vehicle = f"{{fmu: other.fmu, variables: {variables}, parameters: {parameters}}}"
-    other = run(write_scenario(tmp_path, duration="2", surface=surface, vehicle=vehicle))
+    other = run(
+        write_scenario(tmp_path, duration="2", surface=surface, sections={"vehicle": vehicle})
+    )
     for group in ("channels", "truth", "driver", "vehicle"):
         np.testing.assert_array_equal(other.recorder.group(group), own.recorder.group(group))
     assert np.abs(own.recorder.group("truth")).max() > 0.05  # over bumps indeed

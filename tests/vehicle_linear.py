@@ -13,7 +13,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 from vehicle_rig import CORNERS, Array, G, parameter
+
+Complex = npt.NDArray[np.complex128]
 
 X, Y, Z, ROLL, PITCH, YAW, TRAVEL = 0, 1, 2, 3, 4, 5, 6
 SIDE = np.array([1.0, -1.0, 1.0, -1.0])  # left, right
@@ -218,8 +221,12 @@ class LinearCar:
         p[held] = np.linalg.solve(self.K[np.ix_(held, held)], load[held])
         return p
 
-    def response(self, omega: float, road: Array, slope: Array) -> Array:
-        """Complex p (10,) to the road's complex elevation and slope under each wheel, (4,) each.
+    def dynamic_stiffness(self, omega: float) -> Complex:
+        """K + i omega C - omega^2 M, shape (10, 10)."""
+        return np.asarray(self.K - omega**2 * self.M + 1j * omega * self.C)
+
+    def road_force(self, omega: float, road: Array | Complex, slope: Array | Complex) -> Complex:
+        """Generalised force of the road's complex elevation and slope under each wheel, (4,) each.
 
         The road pushes with the tyre's spring and damper; its slope turns the static load.
         """
@@ -230,4 +237,9 @@ class LinearCar:
             forward[X], forward[PITCH] = 1.0, self.hub[i, 2]
             forward[YAW], forward[TRAVEL + i] = -self.hub[i, 1], self.path[i, 0]
             force = force - self.loads[i] * slope[i] * forward
-        return np.linalg.solve(self.K - omega**2 * self.M + 1j * omega * self.C, force)
+        return np.asarray(force)
+
+    def response(self, omega: float, road: Array | Complex, slope: Array | Complex) -> Complex:
+        """Complex p (10,) to the road."""
+        force = self.road_force(omega, road, slope)
+        return np.asarray(np.linalg.solve(self.dynamic_stiffness(omega), force))

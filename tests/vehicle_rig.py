@@ -152,7 +152,7 @@ def run(
             drive(rig)
             rig.step()
             rows[k + 1] = rig.outputs
-    return Record(h * np.arange(count + 1), rows)
+    return Record(np.arange(count + 1, dtype=np.float64) * h, rows)
 
 
 def steer_to(angle: float, ramp: float = 0.0) -> Drive:
@@ -181,7 +181,7 @@ class Cruise:
 
 def straight_track(length: float, grade: float = 0.0) -> Track:
     """A straight track along x from x = -20 m."""
-    s = -20.0 + DS * np.arange(round((length + 20.0) / DS) + 1)
+    s: Array = np.arange(round((length + 20.0) / DS) + 1, dtype=np.float64) * DS - 20.0
     zero = np.zeros_like(s)
     return Track(
         name="rig", length=length, closed=False, s=s, x=s.copy(), y=zero, z=grade * s, heading=zero,

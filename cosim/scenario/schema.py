@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from math import isfinite
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -47,9 +48,9 @@ def _check_duration(value: object) -> object:
 
 
 def _check_parameter(value: object) -> object:
-    if isinstance(value, bool | int | float | str) and value not in (float("inf"), -float("inf")):
+    if isinstance(value, bool | int | str) or (isinstance(value, float) and isfinite(value)):
         return value
-    raise PydanticCustomError("parameter", "must be one number, true, false or text")
+    raise PydanticCustomError("parameter", "must be one finite number, true, false or text")
 
 
 class Model(BaseModel):
