@@ -7,7 +7,7 @@ SCENARIO ?= scenarios/laps/hockenheim_normal_class_a.yaml
 DATA ?= data/paper
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
-.PHONY: demo test check fmu dataset train card figures benchmarks sanitize clean
+.PHONY: demo test check fmu dataset train figures benchmarks sanitize clean
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(SCENARIO)
@@ -47,10 +47,13 @@ dataset: $(VENV)/test.stamp ## the runs behind the published network (about thre
 train: dataset ## the published network and filter (about 20 minutes on 2 cores); resumes where it was stopped
 	$(BIN)/python -m sensor.baselines.fit --data $(DATA) --recipe sensor/recipes/paper.yaml --out sensor/models
 	$(BIN)/python -m sensor.train --data $(DATA) --recipe sensor/recipes/paper.yaml --out build/training --resume
-	cp build/training/bilstm_w19.onnx build/training/training.json sensor/models/
+	cp build/training/bilstm_w19.onnx sensor/models/
+	cp build/training/training.json sensor/models/bilstm_w19.json
 
 figures: $(VENV)/test.stamp ## nine laps on two surfaces: docs/laps.md and the model card (about two minutes)
-	$(BIN)/python docs/measure/laps.py
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/measure/laps.py
+	$(BIN)/python -m sensor.model_card --model sensor/models/bilstm_w19.onnx \
+	    --training sensor/models/bilstm_w19.json --figures build/figures.json
 
 benchmarks: $(VENV)/test.stamp ## real-time factors and loop overhead, beside FMPy's simulate_fmu
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/bench_loop.py

@@ -55,7 +55,7 @@ def driven(folder: Path, duration: str = SHORT, **sections: str) -> Assembly:
         ("Body.Mass: 2e4", "Body.Mass = 20000 kg is above its greatest value 10000 kg"),
         ("PT.RearShare: 1.01", "PT.RearShare = 1.01 is above its greatest value 1"),
         ("Body.Mass: heavy", "Body.Mass = 'heavy' must be a number"),
-        ("Body.Mass: true", "Body.Mass = True must be a number"),
+        ("Body.Mass: true", "Body.Mass = true must be a number"),
         ("SlipControl.Active: 1", "SlipControl.Active = 1.0 must be true or false"),
         ("Car.ax: 1", "has no parameter 'Car.ax'"),
         ("Road.File: road.crg", "'Road.File' is set by road; use that"),
