@@ -14,14 +14,18 @@ from cosim import assembly
 from cosim.assembly import Assembly, assemble, record_groups
 from cosim.controller import FixedDampers
 from cosim.errors import InputError, NetworkError
+from cosim.road import Smooth, build_road, load_track
 from cosim.scenario.load import load
 from sensor import SensorError
 
 SHORT = "0.05"
 
 
-def assembled(folder: Path, duration: str, sections: dict[str, str]) -> Assembly:
-    scenario = load(write_scenario(folder, duration=duration, sections=sections))
+def assembled(
+    folder: Path, duration: str, sections: dict[str, str], length_m: float = 150
+) -> Assembly:
+    path = write_scenario(folder, duration=duration, length_m=length_m, sections=sections)
+    scenario = load(path)
     return assemble(scenario, scenario.controllers[0], sensor=Blind())
 
 
@@ -38,8 +42,8 @@ def complaints(folder: Path, **sections: str) -> list[str]:
     return [str(problem) for problem in caught.value.problems]
 
 
-def driven(folder: Path, duration: str = SHORT, **sections: str) -> Assembly:
-    built = assembled(folder, duration, sections)
+def driven(folder: Path, duration: str = SHORT, length_m: float = 150, **sections: str) -> Assembly:
+    built = assembled(folder, duration, sections, length_m)
     built.run(None)
     return built
 
@@ -171,6 +175,29 @@ def test_a_lap_that_is_given_up_says_so(tmp_path: Path) -> None:
     result = assemble(scenario, scenario.controllers[0], sensor=Blind()).run(None)
     assert result.lap_time_s is None
     assert "duration" not in result.finish_reason
+
+
+@pytest.mark.xfail(strict=True, raises=ValueError, reason="it reserves rows for all that time")
+def test_a_duration_beyond_the_road_costs_nothing(tmp_path: Path) -> None:
+    result = driven(tmp_path, "1e15", length_m=20).recorder
+    assert result.time[-1] < 5.0
+
+
+def test_a_road_file_of_the_users_own(tmp_path: Path) -> None:
+    """The car starts as far behind its beginning as it needs to stand on it, and drives it all."""
+    track = load_track("straight", 60.0)
+    build_road(track, Smooth(), tmp_path).rename(tmp_path / "own.crg")
+    path = tmp_path / "scenario.yaml"
+    path.write_text("name: a\nroad: {file: own.crg}\ndriver: {speed_kmh: 50}\n")
+    scenario = load(path)
+    built = assemble(scenario, scenario.controllers[0], sensor=Blind())
+    result = built.run(None)
+    assert result.finish_reason == "end of the road"
+    assert built.files["road"] == (tmp_path / "own.crg").resolve()
+    assert result.largest_deviation_m < 0.05
+    x = built.recorder.group("vehicle")[:, 0]
+    assert x[0] == pytest.approx(0.0, abs=0.1)
+    assert 60.0 < x[-1] < track.s[-1]
 
 
 def test_comfort_leaves_the_start_out(tmp_path: Path) -> None:

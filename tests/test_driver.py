@@ -283,7 +283,7 @@ def lap(name: str, style: str) -> Drive:
 LAPS = [
     *(pytest.param("hockenheim", style, id=f"hockenheim-{style}") for style in STYLES),
     pytest.param("rural", "aggressive", id="rural-aggressive"),
-    pytest.param("heilbronn", "normal", id="heilbronn-normal", marks=pytest.mark.slow),
+    pytest.param("heilbronn", "normal", id="heilbronn-normal"),
 ]
 # Times of the example's own driver on the same circuit.
 HOCKENHEIM = {"aggressive": 113.0, "normal": 126.0, "defensive": 150.0}

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from click.testing import CliRunner
 from foreign_fmu import ECHO, Variable, own_variables, parrot
 from loop_rig import WINDOW, Blind, Guess, write_scenario
 
 from cosim.assembly import Assembly, assemble
+from cosim.cli import main
 from cosim.controller import SwitchingDampers
 from cosim.errors import FmuError
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
@@ -22,6 +24,7 @@ from cosim.recorder import Recorder, Signal
 from cosim.run import execute
 from cosim.scenario.load import load
 from cosim.vehicle import State
+from sensor import SensorError, default_model
 
 Array = npt.NDArray[np.float64]
 
@@ -384,3 +387,40 @@ def test_telling_progress_changes_nothing(tmp_path: Path) -> None:
     assert told
     runs = [a.recorder.write(tmp_path / n).read_bytes() for a, n in ((first, "a"), (second, "b"))]
     assert runs[0] == runs[1]
+
+
+# ---------------------------------------------------------------- from the command line
+
+
+def test_an_fmu_that_fails_ends_the_command_with_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = parrot_scenario(tmp_path, "Parrot.BadAt: 40, Parrot.BadOutput: 106")
+    monkeypatch.setattr("cosim.assembly.default_model", lambda: path)
+    monkeypatch.setattr("cosim.assembly.OnnxSensor", lambda file: Guess())
+    out = tmp_path / "out"
+    result = CliRunner().invoke(main, ["run", str(path), "--output-dir", str(out)])
+    assert result.exit_code == 3
+    assert result.stderr.startswith("error: p.fmu: Car.vx is nan at t = 0.4 s; the last inputs")
+    assert "Traceback" not in result.output
+    assert len((out / "signals.csv").read_text().splitlines()) == 41
+
+
+def test_the_shipped_network_estimates_in_the_loop(tmp_path: Path) -> None:
+    """On a road like those that it was trained on, it beats standing still."""
+    try:
+        default_model()
+    except SensorError as error:
+        pytest.skip(str(error))
+    path = tmp_path / "lap.yaml"
+    surface = "{kind: iso8608, class: A}"
+    path.write_text(f"name: a\nduration: 15\nroad: {{track: hockenheim, surface: {surface}}}\n")
+    out = tmp_path / "out"
+    result = CliRunner().invoke(main, ["run", str(path), "--json", "--output-dir", str(out)])
+    assert result.exit_code == 0, result.stderr
+    run = json.loads(result.stdout)["runs"]["passive"]
+    assert run["valid_samples"] == 1501 - (WINDOW - 1)
+    assert run["network"]["overall"]["rmse_m_s"] < 0.7 * run["zero"]["overall"]["rmse_m_s"]
+    assert json.loads((out / "versions.json").read_text())["files"].keys() >= {
+        "scenario", "fmu", "network", "road",
+    }  # fmt: skip

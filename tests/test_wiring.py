@@ -264,6 +264,25 @@ def test_undefined_unit(version: int, tmp_path: Path) -> None:
     assert "scale" in problem
 
 
+@pytest.mark.xfail(strict=True, reason="the declared unit is in the way, whatever the map says")
+def test_undefined_unit_with_a_scale(version: int, tmp_path: Path) -> None:
+    """What the message advises: the factor to the SI unit."""
+    fmu = changed(tmp_path / "p.fmu", version, replace(own_variables()["Car.vx"], unit="knot"))
+    wiring, problems = wire(fmu, {"Car.vx": Map("Car.vx", scale=0.5144)})
+    assert not problems
+    assert wiring.outputs[VX].factor == 0.5144
+
+
+@pytest.mark.xfail(strict=True, reason="arrays pass for numbers")
+def test_an_array_is_no_quantity(tmp_path: Path) -> None:
+    def edit(root: ET.Element) -> None:
+        ET.SubElement(variables_of(root)["Car.ax"], "Dimension", start="3")
+
+    fmu = repackage(parrot(tmp_path / "plain.fmu"), tmp_path / "p.fmu", edit)
+    (problem,) = wire(fmu)[1]
+    assert "'Car.ax'" in problem
+
+
 def test_undefined_unit_that_is_ours_anyway(version: int, tmp_path: Path) -> None:
     assert wire(parrot(tmp_path / "p.fmu", version=version, units={})) == (own_wiring(), [])
 

@@ -12,9 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 ROOT = Path(__file__).parents[2]
 CARD_FIGURES = ROOT / "build" / "figures.json"
 PAGE = ROOT / "docs" / "laps.md"
+THETA0 = np.deg2rad(0.45)
 INTRODUCTION = """\
 # The nine laps
 
@@ -24,10 +27,17 @@ still; zero: no motion at all. Heilbronn and the rural road are the training tra
 another surface seed and the passive dampers), Hockenheim is the validation track. Sign right: share
 of samples with a truth above 20 mm/s where the network has its sign. The paper's column comes from
 another simulator, car and roads.
+
+On smooth surfaces the RMSE is of the paper's size, the accuracy is not: its reference values
+grow like 0.0079 v_x even on flat manoeuvres, as if its target held a projection of the speed.
+"On v_rel + v_x sin 0.45 deg" gives the accuracies on that presumed target (the FMU's
+`Car.PaperRelVel`), for the network with the known v_x sin 0.45 deg added, and for that projection
+alone, which knows nothing of the suspension.
 """
 HEADER = (
     "| lap | lap time, s | truth rms, mm/s | network | FIR | body motion | zero | paper "
-    "| sign right, % |\n|---|---|---|---|---|---|---|---|---|\n"
+    "| sign right, % | on v_rel + v_x sin 0.45 deg: network, projection alone, % |\n"
+    "|---|---|---|---|---|---|---|---|---|---|\n"
 )
 ESTIMATORS = ("network", "fir", "body_motion", "zero")
 
@@ -42,6 +52,7 @@ class Lap:
     lap_time_s: float | None
     deviation_m: float
     metrics: dict[str, Any]
+    projection_rms: float  # rms of truth + v_x sin(theta0), m/s: the study's presumed target
 
 
 def drive(file: Path) -> Lap:
@@ -58,7 +69,11 @@ def drive(file: Path) -> Lap:
     metrics = {name: evaluate(estimates[name], truth, rows) for name in ESTIMATORS}
     surface = "smooth" if file.stem.endswith("smooth") else "class A"
     row = str(scenario.paper_row)
-    return Lap(file.stem, row, surface, result.lap_time_s, result.largest_deviation_m, metrics)
+    speed = assembly.recorder.group("channels")[rows, 6:7]
+    projected = float(np.sqrt(np.mean(np.square(truth[rows] + speed * np.sin(THETA0)))))
+    return Lap(
+        file.stem, row, surface, result.lap_time_s, result.largest_deviation_m, metrics, projected
+    )
 
 
 def main() -> None:
@@ -97,7 +112,10 @@ def line(lap: Lap, paper: Any) -> str:
     truth, sign = 1e3 * overall["network"].truth_rms, overall["network"].sign_agreement
     beside = f"{1e3 * paper.rmse_overall:.1f}; {paper.accuracy:.1f}"
     name = lap.row.replace(" track", "")
-    return f"| {name} | {time} | {truth:.1f} | {' | '.join(cells)} | {beside} | {sign:.1f} |\n"
+    on_target = [100 * (1 - overall[e].rmse / lap.projection_rms) for e in ("network", "zero")]
+    row = [name, time, f"{truth:.1f}", *cells, beside, f"{sign:.1f}"]
+    row.append(f"{on_target[0]:.1f}, {on_target[1]:.1f}")
+    return f"| {' | '.join(row)} |\n"
 
 
 if __name__ == "__main__":
