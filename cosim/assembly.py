@@ -103,18 +103,19 @@ def assemble(
     passive = isinstance(controller, Passive) and dampers is None
     start = _start_values(scenario, course, start_speed, passive)
     initial = 0.0 if isinstance(controller, Passive) else controller.initial_command
-    steps = _steps(scenario, travel_time(course.track, speed))
+    steps, if_late = _steps(scenario, travel_time(course.track, speed))
     driver = PathDriver(course.track, speed, STEP_S)
+    recorder = Recorder(record_groups(), steps + 1, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, initial)
     files = {"fmu": description.path, "network": network, "road": course.file}
     return Assembly(
-        recorder=Recorder(record_groups(), steps + 1, STEP_S),
+        recorder=recorder,
         files={name: path for name, path in files.items() if path is not None},
         blocks=Blocks(vehicle, driver, block, dampers or _controller(controller)),
         vehicle=vehicle,
         driver=driver,
         steps=steps,
-        if_late="lap not finished" if scenario.duration == "lap" else "duration reached",
+        if_late=if_late,
     )
 
 
@@ -201,10 +202,12 @@ def _controller(settings: Passive | SkyhookSettings) -> ControllerBlock:
     return Skyhook(settings.feedback == "truth", settings.gain_ns_per_m, settings.initial_command)
 
 
-def _steps(scenario: Scenario, expected_s: float) -> int:
-    if scenario.duration != "lap":
-        return max(round(float(scenario.duration) / STEP_S), 1)
-    return math.ceil(LATE * expected_s / STEP_S)
+def _steps(scenario: Scenario, expected_s: float) -> tuple[int, str]:
+    """Return how many steps at most, and why the run ends there if the road does not end before."""
+    late = math.ceil(LATE * expected_s / STEP_S)
+    if scenario.duration != "lap" and (wanted := float(scenario.duration) / STEP_S) <= late:
+        return max(round(wanted), 1), "duration reached"
+    return late, "lap not finished"
 
 
 def _comfort(recorder: Recorder) -> dict[str, float]:

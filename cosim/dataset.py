@@ -62,6 +62,8 @@ def load_recipe(path: Path) -> DatasetRecipe:
         return DatasetRecipe.model_validate(YAML(typ="safe").load(path.read_text("utf-8")))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8 text") from None
     except YAMLError as error:
         raise InputError(f"{path}: {' '.join(str(error).split())}") from None
     except ValidationError as error:
@@ -77,10 +79,15 @@ def plan(recipe: DatasetRecipe, folder: Path) -> list[PlannedRun]:
         if not files:
             raise InputError(f"no scenario in {folder} matches '{selection.scenarios}'")
         chosen += [(file, dampers) for file in files for dampers in selection.dampers]
-    return [
+    runs = [
         PlannedRun(file, dampers, 1000 * recipe.seed + i)
         for i, (file, dampers) in enumerate(chosen)
     ]
+    stems = [run.stem for run in runs]
+    doubled = sorted({stem for stem in stems if stems.count(stem) > 1})
+    if doubled:
+        raise InputError(f"runs chosen more than once: {', '.join(doubled)}")
+    return runs
 
 
 def build(

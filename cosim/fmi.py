@@ -41,9 +41,10 @@ class Description:
         except Exception as error:
             raise FmuError(f"{path}: not a readable FMU: {_first_line(error)}") from None
         if self.model.coSimulation is None or self.model.fmiVersion[0] not in "23":
+            kind = "for co-simulation" if self.model.coSimulation else "without co-simulation"
             raise FmuError(
-                f"{path}: FMI {self.model.fmiVersion} without co-simulation; "
-                "export it for co-simulation, FMI 2.0 or 3.0"
+                f"{path}: an FMU of FMI {self.model.fmiVersion} {kind}; "
+                "export it for co-simulation with FMI 2.0 or 3.0"
             )
         self.major = int(self.model.fmiVersion[0])
         self.variables: dict[str, Any] = {v.name: v for v in self.model.modelVariables}

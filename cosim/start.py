@@ -64,6 +64,8 @@ def checked_parameters(scenario: Scenario, description: Description) -> list[Pro
 def _unfit(variable: object, value: Value, unit: str | None) -> str | None:
     """Say why a value does not fit a variable, or None."""
     declared = str(getattr(variable, "type"))  # noqa: B009 - FMPy's variables have no types for mypy
+    if getattr(variable, "dimensions", None):
+        return "is an array; only single values can be set"
     kind = KINDS.get(declared)
     if kind is None:
         return f"is of type {declared}; only real, whole, Boolean and text parameters can be set"

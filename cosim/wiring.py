@@ -149,6 +149,8 @@ def _wire(
         return report(
             key, f"'{name}' is of type {variable.type}; {quantity.name} needs real numbers"
         )
+    if getattr(variable, "dimensions", None):
+        return report(key, f"'{name}' is an array; {quantity.name} needs one number")
     return _converted(description, quantity, mapped, name, report)
 
 
@@ -170,10 +172,11 @@ def _converted(
         return report(key, f"the FMU declares '{name}' in {declared}, not in {stated}")
     definition = description.units.get(unit) if unit else None
     if definition is None or definition.baseUnit is None:
-        if unit is None or unit == quantity.unit:
+        if unit is None or unit == quantity.unit or (mapped is not None and scale != 1):
             return Wire(quantity, name, scale, 0.0)
         sentence = (
-            f"the FMU does not define the unit {unit} of '{name}'; leave it out and give scale"
+            f"the FMU does not define the unit {unit} of '{name}': give scale, its factor to "
+            f"{quantity.unit}"
         )
         return report(key, sentence)
     base = definition.baseUnit

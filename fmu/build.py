@@ -141,8 +141,8 @@ def run_compiler(command: list[str], folder: Path) -> None:
 
 
 def link_time_optimisation(cc: list[str]) -> list[str]:
-    """The option for it, if this compiler and its linker can: the plant's small functions across files
-    become one, which makes it a quarter faster.
+    """The option for it, if this compiler and its linker can: small functions of different files
+    become one, which makes the plant a quarter faster.
     """
     with tempfile.TemporaryDirectory() as name:
         Path(name, "probe.c").write_text("int probe(void) { return 0; }\n", encoding="utf-8")

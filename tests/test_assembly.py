@@ -177,7 +177,6 @@ def test_a_lap_that_is_given_up_says_so(tmp_path: Path) -> None:
     assert "duration" not in result.finish_reason
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="it reserves rows for all that time")
 def test_a_duration_beyond_the_road_costs_nothing(tmp_path: Path) -> None:
     result = driven(tmp_path, "1e15", length_m=20).recorder
     assert result.time[-1] < 5.0

@@ -80,7 +80,6 @@ def test_a_pattern_without_a_file(tmp_path: Path) -> None:
         plan(load_recipe(tmp_path / "recipe.yaml"), tmp_path)
 
 
-@pytest.mark.xfail(strict=True, reason="both are driven, into one file, with two seeds")
 def test_a_run_that_is_meant_twice(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").touch()
     twice = tuple(
@@ -131,7 +130,6 @@ def test_no_recipe(tmp_path: Path) -> None:
         load_recipe(tmp_path / "gone.yaml")
 
 
-@pytest.mark.xfail(strict=True, raises=UnicodeDecodeError, reason="it ends in a traceback")
 def test_a_recipe_that_is_no_text(tmp_path: Path) -> None:
     path = tmp_path / "recipe.yaml"
     path.write_bytes(b"name: \xff\xfe\n")

@@ -82,7 +82,7 @@ def test_all_problems_at_once_each_at_its_place(tmp_path):
     assert messages[0] == "duration must be 'lap' or a number of seconds greater than 0, not -3"
     assert messages[1].endswith("not 'hockenhiem'; did you mean 'hockenheim'?")
     assert messages[2] == "'sped_kmh' is not a field of driver; did you mean 'speed_kmh'?"
-    assert messages[3] == "driver.speed_kmh must be greater than 0 km/h, not 0 km/h"
+    assert messages[3] == "driver.speed_kmh must be at least 5 km/h, not 0 km/h"
     assert "must be one finite number" in messages[4]
     assert "there is no file" in messages[5]
     assert messages[6].endswith("not 'skyhok'; did you mean 'skyhook'?")
@@ -162,7 +162,7 @@ def test_an_unknown_field_is_found_wherever_it_stands(tmp_path_factory, name, bl
 
 
 @settings(deadline=None)
-@given(st.floats(1, 200))
+@given(st.floats(5, 200))
 def test_set_is_the_same_as_writing_it_in_the_file(good, speed):
     path = good.with_name("written.yaml")
     path.write_text(GOOD + f"  speed_kmh: {speed!r}\n")

@@ -122,7 +122,7 @@ def test_the_papers_recipe() -> None:
         "window": 19, "units": 167, "hidden": 256, "dropout": 0.5,
     }  # fmt: skip
     assert (recipe.training.epochs, recipe.training.learning_rate) == (30, 1e-3)
-    assert recipe.training.schedule == "constant"
+    assert recipe.training.schedule == "cosine"  # docs/decisions/0004-training-schedule.md
     assert all(pattern.startswith("hockenheim") for pattern in recipe.runs.validation)
     assert not any("hockenheim" in pattern for pattern in recipe.runs.training)
 

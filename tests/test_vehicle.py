@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from foreign_fmu import ECHO, Map, Variable, own_variables, parrot, report
 
 from cosim.errors import FmuError
 from cosim.fmi import Description, Value
-from cosim.quantities import CHANNEL_QUANTITIES, OUTPUT_QUANTITIES, POSE, TRUTH
+from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, OUTPUT_QUANTITIES, POSE, TRUTH
 from cosim.vehicle import RECORDED, Vehicle, builtin_fmu
 from cosim.wiring import mapped_wiring, own_wiring
 
@@ -33,10 +34,12 @@ def told(folder: Path, **orders: float) -> Vehicle:
     return Vehicle(Description(path), own_wiring(), start, H)
 
 
-def echoing(folder: Path, initial_command: float = 0.0) -> Vehicle:
+def echoing(folder: Path, initial_command: float = 0.0, damper_unit: str = "1") -> Vehicle:
     """A parrot whose first seven channels are its seven inputs."""
-    echoes = [Variable(f"Echo.{i}", ECHO + i) for i in range(7)]
-    path = parrot(folder / "echo.fmu", (*own_variables().values(), *echoes))
+    own = own_variables() | {f"Echo.{i}": Variable(f"Echo.{i}", ECHO + i) for i in range(7)}
+    for quantity in DAMPERS:
+        own[quantity.variable] = replace(own[quantity.variable], unit=damper_unit)
+    path = parrot(folder / "echo.fmu", tuple(own.values()))
     mapping = {CHANNEL_QUANTITIES[i].name: Map(f"Echo.{i}") for i in range(7)}
     wiring, problems = mapped_wiring(Description(path), mapping, report)
     assert not problems
@@ -91,9 +94,10 @@ def test_commands_are_held_as_they_were_given(tmp_path: Path) -> None:
     vehicle.close()
 
 
-def test_dampers_begin_with_the_initial_command(tmp_path: Path) -> None:
-    vehicle = echoing(tmp_path, initial_command=0.25)
-    assert vehicle.read().channels[:7].tolist() == [0.0] * 3 + [0.25] * 4
+@pytest.mark.parametrize(("unit", "told"), [("1", 0.25), ("%", 25.0), ("% lifted", 75.0)])
+def test_dampers_begin_with_the_initial_command(tmp_path: Path, unit: str, told: float) -> None:
+    vehicle = echoing(tmp_path, initial_command=0.25, damper_unit=unit)
+    assert vehicle.read().channels[:7].tolist() == pytest.approx([0.0] * 3 + [told] * 4)
     vehicle.close()
 
 

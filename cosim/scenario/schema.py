@@ -12,8 +12,8 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
-from math import isfinite
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -151,7 +151,7 @@ class Driver(Model):
     )
     speed_kmh: float | None = Field(
         default=None,
-        gt=0,
+        ge=5,
         le=250,
         description="start at this speed and never exceed it",
         json_schema_extra=_with_unit("km/h"),
