@@ -25,7 +25,7 @@ def compile_reader(target: Path, *flags: str, program: Path | None = None) -> Pa
 
 
 class _Position(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_double) for name in ("u", "v", "heading", "stretch")]
+    _fields_ = [(name, ctypes.c_double) for name in ("u", "v", "heading", "tx", "ty", "stretch")]
 
 
 class Located(NamedTuple):

@@ -18,10 +18,6 @@ _SPEED_LIMIT = 120 / 3.6  # m/s; a road file knows none
 _FREE_END = 10.0  # road left over behind the finish [m]
 
 
-class _Position(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_double) for name in ("u", "v", "heading", "stretch")]
-
-
 def track_of_file(path: Path) -> Track:
     """Return the reference line of an OpenCRG file as a track.
 

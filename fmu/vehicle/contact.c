@@ -12,8 +12,7 @@ typedef struct { double height, slope_forward, slope_left; } Patch;
 static Patch sample_patch(const Variables *p, const Road *road, Vec ground, double fx, double fy, int *hint) {
     RoadPosition at;
     road_locate(road, ground.x, ground.y, hint, &at);
-    const double ch = cos(at.heading), sh = sin(at.heading);
-    const double along = fx * ch + fy * sh, across = fy * ch - fx * sh; /* wheel heading in road coordinates */
+    const double along = fx * at.tx + fy * at.ty, across = fy * at.tx - fx * at.ty; /* wheel heading on the road */
     const double step = p->Road_PatchLength / PATCH_POINTS, half = p->Road_PatchWidth / 2;
     double sum[2] = {0, 0}, moment = 0, weight = 0;
     for (int line = 0; line < 2; ++line) {

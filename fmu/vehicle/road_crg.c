@@ -116,13 +116,15 @@ static void locate_outside(const Road *road, const Node *end, double x, double y
     out->u = road->u_first + (double)(end - road->node) * road->du + dx * end->tx + dy * end->ty;
     out->v = dy * end->tx - dx * end->ty;
     out->heading = end->heading;
+    out->tx = end->tx;
+    out->ty = end->ty;
     out->stretch = 1.0;
 }
 
 void road_locate(const Road *road, double x, double y, int *hint, RoadPosition *out)
 {
     const Node *node = road->node, *a, *b;
-    double behind, ahead, share, dx, dy, curvature;
+    double behind, ahead, share, dx, dy, curvature, length;
     int i = *hint >= 0 && *hint <= road->rows - 2 ? *hint : nearest_node(road, x, y);
 
     i = i <= road->rows - 2 ? i : road->rows - 2;
@@ -143,6 +145,11 @@ void road_locate(const Road *road, double x, double y, int *hint, RoadPosition *
     out->u = road->u_first + (i + share) * road->du;
     out->v = ((y - a->y) * dx - (x - a->x) * dy) / sqrt(dx * dx + dy * dy);
     out->heading = a->heading + share * (b->heading - a->heading);
+    out->tx = a->tx + share * (b->tx - a->tx);
+    out->ty = a->ty + share * (b->ty - a->ty);
+    length = 1.0 / sqrt(out->tx * out->tx + out->ty * out->ty);
+    out->tx *= length;
+    out->ty *= length;
     curvature = a->curvature + share * (b->curvature - a->curvature);
     curvature = 1.0 - curvature * out->v;
     out->stretch = 1.0 / (curvature > closest_to_centre ? curvature : closest_to_centre);

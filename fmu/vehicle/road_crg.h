@@ -22,6 +22,7 @@ typedef struct {
     double u;       /* along the reference line, in the file's own count [m] */
     double v;       /* to the left of it [m] */
     double heading; /* of the reference line at u, continuous along the road (not wrapped) [rad] */
+    double tx, ty;  /* unit vector of that heading */
     double stretch; /* du/ds along the local heading = 1 / (1 - curvature * v), 20 at most [-] */
 } RoadPosition;
 

@@ -6,8 +6,12 @@
  * centres come out of the geometry; no force is added for them. */
 #include "vehicle.h"
 
-/* Sine and cosine of the small kinematic angles: Taylor series, 1e-13 up to 0.2 rad, no library call. */
+/* Sine and cosine of the mostly small kinematic angles: Taylor series to 1e-13 up to 0.2 rad, the library beyond. */
 static void small_angle(double a, double *sine, double *cosine) {
+    if (fabs(a) > 0.2) {
+        *sine = sin(a), *cosine = cos(a);
+        return;
+    }
     const double s = a * a;
     *sine = a * (1 - s / 6 * (1 - s / 20 * (1 - s / 42)));
     *cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30 * (1 - s / 56)));
@@ -46,9 +50,9 @@ void corner_kinematics(const Variables *p, const Vehicle *c, const State *x, int
 
     double gradient;
     const double caster = p->Kin_Caster[i], steer = ackermann(p, c, x->rack, i, &gradient) + x->compliance[i];
-    double sc, cc;
+    double sc, cc, ss, cs;
     small_angle(caster, &sc, &cc);
-    const double ss = sin(steer), cs = cos(steer);
+    small_angle(steer, &ss, &cs);
     k->steer = steer;
     k->kingpin = turn_by(&a, vec(-sc, 0, cc));
     k->axle = turn_by(&a, vec(-cc * ss, cs, -sc * ss)); /* e_y turned about the kingpin */

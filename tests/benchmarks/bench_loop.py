@@ -7,25 +7,32 @@ of a run less the time of the same FMU stepped by bare C calls; beside it stands
 
 from __future__ import annotations
 
+import contextlib
 import statistics
 import time
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.assembly import STEP_S, Assembly, assemble
+from cosim.course import course_of
 from cosim.dataset import NoSensor
 from cosim.fmi import Description, Slave
 from cosim.quantities import INPUT_QUANTITIES, OUTPUT_QUANTITIES
 from cosim.scenario.load import load
+from cosim.speed_profile import STYLES, speed_profile
+from cosim.start import builtin_start
 from cosim.vehicle import builtin_fmu
 
 SCENARIO = Path(__file__).parents[2] / "scenarios/laps/hockenheim_normal_class_a.yaml"
 DURATION = 60
 STEPS = round(DURATION / STEP_S)
 ROUNDS = 5
+INPUTS = [q.variable for q in INPUT_QUANTITIES]
 
 
 def prepared(**blocks: Any) -> Assembly:
@@ -44,38 +51,39 @@ def run_without_sensor() -> float:
     return prepared(sensor=NoSensor()).run(None).wall_time_s
 
 
-def start_values() -> dict[str, Any]:
-    """Return what the run above gives the FMU, so that all drive the same road."""
-    from cosim.course import course_of
-    from cosim.start import builtin_start
-
-    course = course_of(load(SCENARIO, []))
-    return builtin_start(course, 30.0, True)
+@cache
+def lap() -> tuple[dict[str, Any], npt.NDArray[np.float64]]:
+    """Return the run's start values and its inputs (steps, 7): everybody drives the same minute."""
+    scenario = load(SCENARIO, [f"duration={DURATION}"])
+    assembly = prepared(sensor=NoSensor())
+    assembly.run(None)
+    course = course_of(scenario)
+    speed = speed_profile(course.track, STYLES[scenario.driver.style])
+    start = builtin_start(course, float(speed[np.searchsorted(course.track.s, 0.0)]), True)
+    groups = [assembly.recorder.group(name) for name in ("driver", "command")]
+    return start, np.hstack(groups)[:STEPS].copy()
 
 
 def bare_steps() -> float:
-    """The FMU's own stepping: nothing but fmi3DoStep with wrapped arguments, the car rolling
-    straight on.
-    """
-    slave = Slave(Description(builtin_fmu()), [], [])
-    slave.initialise(start_values())
-    begin = time.perf_counter()
-    for k in range(STEPS):
-        slave.step(k, STEP_S)
-    elapsed = time.perf_counter() - begin
-    slave.close()
-    return elapsed
+    """The FMU's own stepping: inputs replayed, fmi3DoStep with wrapped arguments, nothing read."""
+    return replayed([])
 
 
 def our_exchange() -> float:
-    """The same with 7 inputs set and every output of the loop read at each step."""
-    inputs = [q.variable for q in INPUT_QUANTITIES]
-    outputs = [q.variable for q in OUTPUT_QUANTITIES]
-    slave = Slave(Description(builtin_fmu()), inputs, outputs)
-    slave.initialise(start_values())
+    """The same with every output of the loop read at each step."""
+    return replayed([q.variable for q in OUTPUT_QUANTITIES])
+
+
+def replayed(outputs: list[str]) -> float:
+    """Drive the recorded minute once; loading and initialising are not counted."""
+    start, inputs = lap()
+    slave = Slave(Description(builtin_fmu()), INPUTS, outputs)
+    slave.initialise(start)
     begin = time.perf_counter()
     for k in range(STEPS):
-        slave.read()
+        slave.inputs[:] = inputs[k]
+        if outputs:
+            slave.read()
         slave.step(k, STEP_S)
     elapsed = time.perf_counter() - begin
     slave.close()
@@ -86,19 +94,22 @@ def simulate_fmu() -> float:
     """FMPy's own loop on the same FMU, inputs and outputs; loading and initialising taken off."""
     import fmpy
 
+    start, inputs = lap()
     description = fmpy.read_model_description(str(builtin_fmu()))
     folder = fmpy.extract(str(builtin_fmu()))
-    names = [q.variable for q in INPUT_QUANTITIES]
-    signals = np.zeros(STEPS + 1, dtype=[("time", float), *((n, float) for n in names)])
+    signals = np.zeros(STEPS + 1, dtype=[("time", float), *((n, float) for n in INPUTS)])
     signals["time"] = np.arange(STEPS + 1) * STEP_S
+    for column, name in enumerate(INPUTS):
+        signals[name][:STEPS] = inputs[:, column]
 
     def simulate(stop: float) -> float:
         begin = time.perf_counter()
-        fmpy.simulate_fmu(
-            folder, model_description=description, stop_time=stop, step_size=STEP_S,
-            output_interval=STEP_S, start_values=start_values(), input=signals,
-            output=[q.variable for q in OUTPUT_QUANTITIES],
-        )  # fmt: skip
+        with contextlib.redirect_stdout(None):  # it warns of inputs that are not given
+            fmpy.simulate_fmu(
+                folder, model_description=description, stop_time=stop, step_size=STEP_S,
+                output_interval=STEP_S, start_values=start, input=signals,
+                output=[q.variable for q in OUTPUT_QUANTITIES],
+            )  # fmt: skip
         return time.perf_counter() - begin
 
     return simulate(DURATION) - simulate(STEP_S)
@@ -108,7 +119,7 @@ def road_loading() -> float:
     """Reading the lap's OpenCRG file, at its one-off cost."""
     begin = time.perf_counter()
     slave = Slave(Description(builtin_fmu()), [], [])
-    slave.initialise(start_values())
+    slave.initialise(lap()[0])
     elapsed = time.perf_counter() - begin
     slave.close()
     return elapsed
