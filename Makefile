@@ -35,7 +35,7 @@ $(VENV)/test.stamp: $(SOURCES) | $(VENV)/bin/python
 check: $(VENV)/test.stamp ## formatting
 	$(BIN)/ruff format --check .
 
-fmu: ## rebuild the FMUs after a change of the C sources
+fmu: $(VENV)/demo.stamp ## rebuild the FMUs after a change of the C sources
 	$(BIN)/python fmu/build.py
 
 sanitize: $(VENV)/test.stamp ## AddressSanitizer, UBSan and leak check over 50 lives of the vehicle FMU
@@ -44,7 +44,7 @@ sanitize: $(VENV)/test.stamp ## AddressSanitizer, UBSan and leak check over 50 l
 dataset: $(VENV)/test.stamp ## the runs behind the published network (about three minutes)
 	$(BIN)/cosim dataset scenarios/datasets/paper.yaml --out $(DATA)
 
-train: dataset ## the published network and filter (about 20 minutes on 2 cores); resumes where it was stopped
+train: dataset ## the published network and filter (about 25 minutes on 2 cores); resumes where it was stopped
 	$(BIN)/python -m sensor.baselines.fit --data $(DATA) --recipe sensor/recipes/paper.yaml --out sensor/models
 	$(BIN)/python -m sensor.train --data $(DATA) --recipe sensor/recipes/paper.yaml --out build/training --resume
 	cp build/training/bilstm_w19.onnx sensor/models/
@@ -60,4 +60,4 @@ benchmarks: $(VENV)/test.stamp ## real-time factors and loop overhead, beside FM
 	$(BIN)/python tests/benchmarks/bench_sensor.py
 
 clean:
-	rm -rf build dist results cosim/fmus
+	rm -rf build dist results cosim/fmus $(VENV)/*.stamp

@@ -13,7 +13,7 @@ import numpy as np
 
 from cosim import loop
 from cosim.comfort import ride_figures
-from cosim.controller import FixedDampers, Skyhook
+from cosim.controller import FixedDampers, Skyhook, damper_map
 from cosim.course import Course, course_of
 from cosim.driver import PathDriver
 from cosim.errors import InputError, NetworkError, Problem
@@ -94,16 +94,20 @@ def assemble(
     does not load.
     """
     wiring, description, course = _checked(scenario)
-    network = None if sensor is not None else _network(scenario)
-    block = sensor or _sensor(_network(scenario))
+    network = None
+    if sensor is None:
+        network = _network(scenario)
+        sensor = _sensor(network)
     style = STYLES[scenario.driver.style]
     cap = scenario.driver.speed_kmh / 3.6 if scenario.driver.speed_kmh else None
     speed = speed_profile(course.track, style, cap)
     start_speed = float(speed[int(np.searchsorted(course.track.s, 0.0))])
     passive = isinstance(controller, Passive) and dampers is None
-    start = _start_values(scenario, course, start_speed, passive)
+    start = _start_values(scenario, description, course, start_speed, passive)
     initial = 0.0 if isinstance(controller, Passive) else controller.initial_command
-    steps, if_late = _steps(scenario, travel_time(course.track, speed))
+    expected = travel_time(course.track, speed)
+    _check_length(scenario, expected)
+    steps, if_late = _steps(scenario, expected)
     driver = PathDriver(course.track, speed, STEP_S)
     recorder = Recorder(record_groups(), steps + 1, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, initial)
@@ -111,7 +115,7 @@ def assemble(
     return Assembly(
         recorder=recorder,
         files={name: path for name, path in files.items() if path is not None},
-        blocks=Blocks(vehicle, driver, block, dampers or _controller(controller)),
+        blocks=Blocks(vehicle, driver, sensor, dampers or _controller(scenario, controller)),
         vehicle=vehicle,
         driver=driver,
         steps=steps,
@@ -173,12 +177,12 @@ def _unlimited(course: Course) -> bool:
 
 
 def _start_values(
-    scenario: Scenario, course: Course, speed: float, passive: bool
+    scenario: Scenario, description: Description, course: Course, speed: float, passive: bool
 ) -> dict[str, Value]:
-    settings = scenario.vehicle
-    if settings.fmu != "builtin":
-        return dict(settings.parameters)
-    return builtin_start(course, speed, passive) | settings.parameters
+    """Return the start values; of ours, another FMU gets those that it has by the same names."""
+    own = builtin_start(course, speed, passive)
+    known = {name: value for name, value in own.items() if name in description.variables}
+    return known | scenario.vehicle.parameters
 
 
 def _network(scenario: Scenario) -> Path:
@@ -196,10 +200,25 @@ def _sensor(network: Path) -> OnnxSensor:
         raise NetworkError(str(error)) from None
 
 
-def _controller(settings: Passive | SkyhookSettings) -> ControllerBlock:
+def _controller(scenario: Scenario, settings: Passive | SkyhookSettings) -> ControllerBlock:
     if isinstance(settings, Passive):
         return FixedDampers()
-    return Skyhook(settings.feedback == "truth", settings.gain_ns_per_m, settings.initial_command)
+    return Skyhook(
+        settings.feedback == "truth",
+        settings.gain_ns_per_m,
+        settings.initial_command,
+        damper_map(scenario.vehicle.parameters),
+    )
+
+
+def _check_length(scenario: Scenario, expected_s: float) -> None:
+    """Raise `InputError` where the road ends before the scenario's duration is over."""
+    if scenario.duration != "lap" and float(scenario.duration) > expected_s:
+        sentence = (
+            f"the road ends after about {expected_s:.0f} s, before the duration of "
+            f"{float(scenario.duration):g} s: give a longer road, or duration: lap"
+        )
+        raise InputError(scenario.problem(("duration",), sentence))
 
 
 def _steps(scenario: Scenario, expected_s: float) -> tuple[int, str]:

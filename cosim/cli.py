@@ -1,7 +1,7 @@
 """The command line; heavy packages are imported where they are used, so that `--help` is quick.
 
 Results for programs go to stdout (`--json`), words for people to stderr. Exit codes: 0 fine, 1 a
-limit failed, 2 wrong usage or bad input, 3 an FMU or a network failed.
+limit failed, 2 wrong usage or bad input, 3 an FMU or a network failed, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -108,8 +108,12 @@ def _failures_as_exit_codes() -> Iterator[None]:
         for problem in getattr(error, "problems", (error,)):
             click.echo(f"error: {problem}", err=True)
         sys.exit(error.exit_code)
+    except OSError as error:
+        where = f"'{error.filename}': " if error.filename else ""
+        click.echo(f"error: {where}{error.strerror or error}", err=True)
+        sys.exit(2)
     except KeyboardInterrupt:
-        click.echo("interrupted; the samples recorded so far were written", err=True)
+        click.echo("interrupted; what was recorded until then is on disk", err=True)
         sys.exit(INTERRUPTED)
 
 

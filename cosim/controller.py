@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -28,6 +29,26 @@ class DamperMap:
     hard_rebound: tuple[float, ...] = (0.0, 900.0, 1500.0, 2350.0, 3300.0, 4900.0)
     hard_compression: tuple[float, ...] = (0.0, 520.0, 900.0, 1550.0, 2150.0, 3000.0)
     scale: tuple[float, float, float, float] = (1.0, 1.0, 1.33, 1.33)
+
+
+def damper_map(parameters: Mapping[str, object]) -> DamperMap:
+    """Return the map of the vehicle FMU's parameters Damp.*; the rest keeps its default."""
+    default = DamperMap()
+
+    def forces(name: str, values: tuple[float, ...]) -> tuple[float, ...]:
+        read = (parameters.get(f"Damp.{name}{i}", values[i]) for i in range(1, len(values)))
+        return (0.0, *(float(str(force)) for force in read))
+
+    corners = zip(("FL", "FR", "RL", "RR"), default.scale, strict=True)
+    fl, fr, rl, rr = (float(str(parameters.get(f"Damp.Scale{c}", s))) for c, s in corners)
+    return DamperMap(
+        default.speed,
+        forces("SoftRebound", default.soft_rebound),
+        forces("SoftCompression", default.soft_compression),
+        forces("HardRebound", default.hard_rebound),
+        forces("HardCompression", default.hard_compression),
+        (fl, fr, rl, rr),
+    )
 
 
 class FixedDampers:
@@ -63,7 +84,7 @@ class SwitchingDampers:
         return self.command
 
 
-SKYHOOK_GAIN: Final = 3500.0  # N s/m, the flat optimum of docs/closed-loop.md
+SKYHOOK_GAIN: Final = 3500.0  # N s/m, between comfort and tyre load: docs/closed-loop.md
 
 
 class Skyhook:

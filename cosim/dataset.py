@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -96,11 +97,44 @@ def build(
     executor: Executor,
     progress: Callable[[str], None] = lambda stem: None,
 ) -> None:
-    """Drive every run whose file is not there yet and write it to `directory`."""
+    """Drive every run that is not in `directory` yet, or there from another FMU or scenario."""
     directory.mkdir(parents=True, exist_ok=True)
-    missing = [run for run in runs if not (directory / f"{run.stem}.parquet").is_file()]
+    missing = [run for run in runs if not _is_there(run, directory)]
     for stem in executor.map(drive, missing, [directory] * len(missing)):
         progress(stem)
+
+
+def _is_there(planned: PlannedRun, directory: Path) -> bool:
+    """Whether the run's file is there, driven from the same scenario, seed and vehicle FMU."""
+    import json
+
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = directory / f"{planned.stem}.parquet"
+    if not path.is_file():
+        return False
+    try:
+        metadata = pq.read_schema(path).metadata or {}
+    except pa.ArrowInvalid:
+        return False
+    return bool(json.loads(metadata.get(b"recipe", b"{}")) == _recipe(planned))
+
+
+def _recipe(planned: PlannedRun) -> dict[str, str | int]:
+    """Return what a run is driven from, for its file's metadata."""
+    from cosim.vehicle import builtin_fmu
+
+    digests = {
+        name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for name, path in (("scenario_sha256", planned.scenario), ("fmu_sha256", builtin_fmu()))
+    }
+    return {
+        "scenario": planned.scenario.name,
+        "dampers": planned.dampers,
+        "seed": planned.seed,
+        **digests,
+    }
 
 
 def drive(planned: PlannedRun, directory: Path) -> str:
@@ -119,12 +153,11 @@ def drive(planned: PlannedRun, directory: Path) -> str:
     if result.lap_time_s is None:
         raise InputError(f"{planned.scenario}: the lap was not finished, so it is no training run")
     record = assembly.recorder
-    recipe = {"scenario": planned.scenario.name, "dampers": planned.dampers, "seed": planned.seed}
     run = Run(
         planned.stem,
         record.group("channels").astype(np.float32),
         record.group("truth").astype(np.float32),
-        recipe,
+        _recipe(planned),
     )
     part = directory / f".{planned.stem}.part"
     write_run(part, run)

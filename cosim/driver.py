@@ -28,8 +28,9 @@ SPACING: Final = 0.5  # of the points at which the driver knows the road [m]
 class DriverModel:
     """What the driver knows of his car, and how he drives. SI units.
 
-    The understeer gradient and the rear axle's slip gradient are the steady-state figures of the
-    package's vehicle (docs/vehicle.md); another car only costs the feed-forward some accuracy.
+    `understeer` is 2 deg/g at the hand wheel over the ratio, the package's vehicle at 2 to 4 m/s2;
+    `rear_slip` is the rear axle's slip angle per lateral acceleration, weight over cornering
+    stiffness. Another car only costs the feed-forward some accuracy.
     """
 
     wheelbase: float = 2.675

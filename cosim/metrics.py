@@ -30,11 +30,10 @@ RUN_FIGURES: Final = (
     "simulated_s",
     "wall_time_s",
     "real_time_factor",
-    "largest_deviation_m",
     "valid_samples",
 )
 
-# Longest endings first: a unit is read off the end of a figure's name.
+# A unit is read off the end of a figure's name; of two endings that fit, the first here counts.
 UNITS: Final = {
     "_m_s2": "m/s²",
     "_m_s": "m/s",

@@ -164,12 +164,14 @@ def _assemble() -> Assemble:
 
 def _prepare(output_dir: Path, scenario: Scenario) -> None:
     """Make the folder, and take away what an earlier run left there."""
-    folders = [output_dir, *(output_dir / item.label for item in scenario.controllers)]
     try:
         output_dir.mkdir(parents=True, exist_ok=True)
-        for folder in folders:
-            for name in RESULT_FILES:
-                (folder / name).unlink(missing_ok=True)
+        for folder in (output_dir, *(path for path in output_dir.iterdir() if path.is_dir())):
+            left = [folder / name for name in RESULT_FILES if (folder / name).is_file()]
+            for path in left:
+                path.unlink()
+            if left and folder != output_dir and not any(folder.iterdir()):
+                folder.rmdir()
         (output_dir / "scenario.resolved.yaml").write_text(
             resolved_yaml(scenario), encoding="utf-8"
         )
@@ -218,17 +220,35 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
     from cosim.compare import paper_figures
 
     figures = {run.label: run.figures for run in runs}
-    verdicts = tuple(evaluate(scenario.limits, figures))
+    verdicts = (*evaluate(scenario.limits, figures), *_unfinished(scenario, figures))
     metrics = finite(
         {
             "scenario": scenario.name,
             "runs": figures,
             "limits": [asdict(verdict) for verdict in verdicts],
-            "paper": paper_figures(scenario.paper_row),
+            "paper": paper_figures(scenario.paper_row if _is_papers(scenario) else None),
         }
     )
     _write_json(output_dir / "metrics.json", metrics)
     return Outcome(scenario, output_dir, runs, verdicts, metrics)
+
+
+def _is_papers(scenario: Scenario) -> bool:
+    """Whether the scenario still is its row of the paper: the whole lap, by that row's driver."""
+    row = scenario.paper_row or ""
+    style = f"{scenario.driver.style.capitalize()} driver"
+    return bool(row) and scenario.duration == "lap" and ("driver" not in row or style in row)
+
+
+def _unfinished(scenario: Scenario, figures: Mapping[str, Any]) -> list[Verdict]:
+    """Return a failure for each lap that did not come to its end, whatever the limits are."""
+    if scenario.duration != "lap":
+        return []
+    return [
+        Verdict(label, "lap_time_s", None, 0.0, None, False)
+        for label, run in figures.items()
+        if run["lap_time_s"] is None
+    ]
 
 
 def _report(outcome: Outcome, versions: Mapping[str, Any]) -> Outcome:

@@ -199,6 +199,6 @@ def _same_dimension(base: Any, unit: str, wanted: str) -> bool:
     """
     expected = _DIMENSIONS[wanted]
     found = {name: getattr(base, name, 0) or 0 for name in _EXPONENTS}
-    if expected.get("rad") and not found["rad"] and re.search(r"rad|deg|grad|°", unit):
+    if expected.get("rad") and not found["rad"] and re.search(r"rad|deg|grad|°|rpm", unit):
         found["rad"] = expected["rad"]
     return all(found[name] == expected.get(name, 0) for name in _EXPONENTS)

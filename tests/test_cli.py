@@ -3,6 +3,7 @@ import subprocess
 import sys
 import time
 import types
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -173,3 +174,17 @@ def test_help_is_quick_and_needs_no_heavy_package():
     )  # fmt: skip
     assert time.perf_counter() - start < 5  # about 0.15 s alone on a desktop processor
     assert done.stdout.rstrip().endswith("[]")
+
+
+def test_a_lap_that_is_not_finished_fails_without_a_limit(tmp_path, monkeypatch):
+    """Nobody should take half a lap for a passed one."""
+    (tmp_path / "a.yaml").write_text("name: a\nroad: {track: rural}\n")
+    stuck = StandIn()
+    finish = stuck.run
+    stuck.run = lambda progress: replace(finish(progress), lap_time_s=None)
+    monkeypatch.setattr("cosim.run._assemble", lambda: lambda *_: stuck)
+    result = CliRunner().invoke(
+        main, ["run", str(tmp_path / "a.yaml"), "--output-dir", str(tmp_path / "out")]
+    )
+    assert result.exit_code == 1
+    assert "lap_time_s" in result.stderr

@@ -24,7 +24,6 @@ from cosim.recorder import Recorder, Signal
 from cosim.run import execute
 from cosim.scenario.load import load
 from cosim.vehicle import State
-from sensor import SensorError, default_model
 
 Array = npt.NDArray[np.float64]
 
@@ -408,10 +407,6 @@ def test_an_fmu_that_fails_ends_the_command_with_3(
 
 def test_the_shipped_network_estimates_in_the_loop(tmp_path: Path) -> None:
     """On a road like those that it was trained on, it beats standing still."""
-    try:
-        default_model()
-    except SensorError as error:
-        pytest.skip(str(error))
     path = tmp_path / "lap.yaml"
     surface = "{kind: iso8608, class: A}"
     path.write_text(f"name: a\nduration: 15\nroad: {{track: hockenheim, surface: {surface}}}\n")

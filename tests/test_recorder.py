@@ -83,7 +83,8 @@ def test_csv_opens_in_pandas(tmp_path):
 
 
 def test_parquet_carries_units(tmp_path):
-    pq = pytest.importorskip("pyarrow.parquet")
+    import pyarrow.parquet as pq
+
     values = np.random.default_rng(1).standard_normal((4, 3))
     table = pq.read_table(filled(values).write(tmp_path, "parquet"))
     assert table.schema.field("Car.ax").metadata == {

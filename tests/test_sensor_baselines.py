@@ -77,7 +77,6 @@ def test_best_ridge_is_chosen_in_validation() -> None:
 
 
 def test_fit_command(tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
     for name, seed in (("a", 1), ("b", 2)):
         write_run(tmp_path / f"{name}.parquet", known_run(name, 300, seed))
     recipe = tmp_path / "r.yaml"

@@ -2,14 +2,13 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from sensor.channels import CHANNEL_NAMES
 from sensor.dataset import Normalisation, Run, WindowSet, read_run, read_runs, write_run
 from sensor.errors import SensorError
-
-pa = pytest.importorskip("pyarrow")
-pq = pytest.importorskip("pyarrow.parquet")
 
 PLAIN = Normalisation(
     *(np.full(width, value, dtype=np.float32) for width in (14, 4) for value in (0.0, 1.0))

@@ -7,16 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import onnx
 import pytest
+import torch
 
 from sensor.errors import SensorError
+from sensor.export import build_windowed, export_windowed, verify
+from sensor.network import BiLstmNetwork, NetworkConfig
 from sensor.runtime import OnnxSensor
-
-torch = pytest.importorskip("torch")
-onnx = pytest.importorskip("onnx")
-
-from sensor.export import build_windowed, export_windowed, verify  # noqa: E402
-from sensor.network import BiLstmNetwork, NetworkConfig  # noqa: E402
 
 Array = npt.NDArray[np.float64]
 SAMPLES: Array = np.random.default_rng(0).normal(size=(60, 14)) * np.logspace(-1, 1, 14) + 2.0

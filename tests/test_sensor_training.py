@@ -4,21 +4,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from click.testing import CliRunner
 
+from sensor import train as train_module
 from sensor.dataset import Run, write_run
 from sensor.errors import SensorError
 from sensor.metrics import evaluate
 from sensor.model_card import figure_row, main, model_card
 from sensor.recipe import RECIPES, Recipe, TrainingRecipe, read_recipe
 from sensor.runtime import OnnxSensor
-
-torch = pytest.importorskip("torch")
-pytest.importorskip("pyarrow")
-pytest.importorskip("onnx")
-
-from sensor import train as train_module  # noqa: E402
-from sensor.training import fit, learning_rate, train  # noqa: E402
+from sensor.training import fit, learning_rate, train
 
 
 def linear_run(name: str, seed: int) -> Run:

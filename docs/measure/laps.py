@@ -24,7 +24,8 @@ INTRODUCTION = """\
 Written by `make figures`. RMSE over all four wheels in mm/s, then the accuracy of the paper's
 equation 2 in %. FIR: linear ridge filter over the same 19 samples; body motion: wheels assumed
 still; zero: no motion at all. Heilbronn and the rural road are the training tracks (here with
-another surface seed and the passive dampers), Hockenheim is the validation track. Sign right: share
+another surface seed and the passive dampers), Hockenheim is the validation track: the best
+epoch was chosen on it. Sign right: share
 of samples with a truth above 20 mm/s where the network has its sign. The paper's column comes from
 another simulator, car and roads.
 

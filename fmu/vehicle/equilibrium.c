@@ -3,7 +3,6 @@
  * Nine unknowns (heave, roll, pitch, four travels, and one longitudinal and one lateral slip common to the wheels) make
  * nine accelerations vanish; Newton's method with a finite-difference Jacobian on the model's own derivative. The
  * states behind (spins, motor torques, brakes, rack) are set to the values that balance. */
-#include <stdio.h>
 #include <string.h>
 #include "vehicle.h"
 

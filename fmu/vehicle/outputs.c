@@ -27,7 +27,7 @@ static void body_outputs(Variables *v, const Vehicle *c, const State *x, const W
     v->Car_SideSlipAngle = atan2(velocity.y, fmax(fabs(velocity.x), 0.1));
 }
 
-static void corner_outputs(Variables *v, const Vehicle *c, const State *x, const Work *w, int i) {
+static void corner_outputs(Variables *v, const State *x, const Work *w, int i) {
     const Corner *k = &w->corner[i];
     const Tyre *t = &w->tyre[i];
     const double spin = x->spin[i] - dot(k->rate, k->axle), ratio = v->Damp_MotionRatio[i];
@@ -48,7 +48,6 @@ static void corner_outputs(Variables *v, const Vehicle *c, const State *x, const
     v->Car_zRoad[i] = w->contact[i].height;
     v->PT_Motor_Trq[i] = x->motor_torque[i];
     v->Brake_Trq[i] = x->brake_torque[i];
-    (void)c;
 }
 
 /* Mean of the middle two wheel speeds: neither a locking nor a spinning wheel gets in. */
@@ -84,7 +83,7 @@ static void energy_outputs(Variables *v, const Vehicle *c, const State *x, const
 void vehicle_outputs(Variables *v, const Vehicle *c, Memory *m, const Work *w) {
     const State *x = &m->x;
     body_outputs(v, c, x, w);
-    for (int i = 0; i < CORNERS; ++i) corner_outputs(v, c, x, w, i);
+    for (int i = 0; i < CORNERS; ++i) corner_outputs(v, x, w, i);
     sensor_outputs(v, c, x, w);
     energy_outputs(v, c, x, w);
     v->Steer_WhlAng = m->steer;

@@ -1,7 +1,7 @@
 /* Massless rack with compliance, Ackermann geometry, and the bushings' lateral-force steer. */
 #include "vehicle.h"
 
-enum { MAX_RACK_MRAD = 600 };
+static const double LARGEST_RACK = 0.6; /* mean road-wheel angle at the stops, rad */
 
 /* Road-wheel angle of corner i over the mean angle `rack`. The inner wheel gains a share of
  * full Ackermann, delta^2 track / wheelbase between the two (second order in delta). */
@@ -24,8 +24,7 @@ void steering_rates(const Variables *p, const Vehicle *c, const State *x, double
         w->compliance_rate[i] =
             (p->Kin_LateralForceSteer[i] * w->tyre[i].Fy - x->compliance[i]) / p->Kin_ComplianceLag;
     }
-    const double limit = MAX_RACK_MRAD / 1000.0;
-    const double demand = clamp(hand_wheel / p->Steer_Ratio, -limit, limit);
+    const double demand = clamp(hand_wheel / p->Steer_Ratio, -LARGEST_RACK, LARGEST_RACK);
     w->rack_rate = (p->Steer_Stiffness * (demand - x->rack) + moment) / p->Steer_Damping;
     for (int i = 0; i < CORNERS; ++i) {
         Corner *k = &w->corner[i];

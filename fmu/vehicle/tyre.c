@@ -7,7 +7,7 @@
 
 static const double MAX_SLIP_X = 1.5, MAX_SLIP_Y = 1.7; /* carcass deflection limits, in slips: far beyond the peak */
 
-/* sin(C atan(B s - E (B s - atan B s))), and the cosine form; E > 1 would let the curve turn back (eq. 4.E: E <= 1). */
+/* sin(C atan(B s - E (B s - atan B s))), and the cosine form; E > 1 would let the curve turn back (E <= 1 is a condition of the formula). */
 static double shape(double B, double E, double s) {
     const double Bs = B * s, e = E > 1 ? 1 : E;
     return atan(Bs - e * (Bs - atan(Bs)));
@@ -15,12 +15,12 @@ static double shape(double B, double E, double s) {
 
 static double sine_of_twice_atan(double z) { return 2 * z / (1 + z * z); }
 
-double tyre_relaxation_y(const Variables *p, double Fz, double radius) { /* eq. 4.E (PAC2002: sigma_alpha) */
+double tyre_relaxation_y(const Variables *p, double Fz, double radius) { /* PAC2002, sigma_alpha */
     const double length = p->Tire_PTY1 * sine_of_twice_atan(Fz / (p->Tire_PTY2 * p->Tire_NominalLoad)) * radius;
     return length > 0.05 ? length : 0.05;
 }
 
-/* Effective rolling radius, Pacejka eq. 4.E / MF-Tyre: falls with load, much less than the loaded radius does. */
+/* Effective rolling radius, as MF-Tyre has it: falls with load, much less than the loaded radius does. */
 double tyre_rolling_radius(const Variables *p, double Fz, double radius) {
     const double load = p->Tire_LoadDependentRadius ? Fz / p->Tire_NominalLoad : 1.0;
     return radius - p->Tire_NominalLoad / p->Tire_Stiffness * (p->Tire_FREFF * load + p->Tire_DREFF * atan(p->Tire_BREFF * load));
@@ -53,7 +53,7 @@ static Forces magic_formula(const Variables *p, double Fz, double kappa, double 
     const double Fy = Fy0 * cos(p->Tire_RCY1 * shape(By, p->Tire_REY1, kappa)); /* RHY1 = 0: no denominator */
 
     const double ratio = Kx * kappa / Ky;
-    const double equivalent = sign * atan(sqrt(tan_alpha * tan_alpha + ratio * ratio)); /* combined slip, eq. 4.E */
+    const double equivalent = sign * atan(sqrt(tan_alpha * tan_alpha + ratio * ratio)); /* combined slip */
     const double Bt = p->Tire_QBZ1 / (p->Tire_FrictionY * p->Road_Friction); /* eq. 4.E40: less friction, same shape at less slip */
     const double trail = Fz * p->Tire_QDZ1 * p->Tire_Radius / Fz0 * cos(p->Tire_QCZ1 * shape(Bt, p->Tire_QEZ1, equivalent)) /
                          sqrt(1 + tan_alpha * tan_alpha);
