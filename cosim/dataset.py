@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -123,10 +122,11 @@ def _is_there(planned: PlannedRun, directory: Path) -> bool:
 
 def _recipe(planned: PlannedRun) -> dict[str, str | int]:
     """Return what a run is driven from, for its file's metadata."""
+    from cosim.provenance import sha256
     from cosim.vehicle import builtin_fmu
 
     digests = {
-        name: hashlib.sha256(path.read_bytes()).hexdigest()
+        name: sha256(path)
         for name, path in (("scenario_sha256", planned.scenario), ("fmu_sha256", builtin_fmu()))
     }
     return {

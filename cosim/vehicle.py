@@ -61,7 +61,6 @@ class Vehicle:
         initial_command: float = 0.0,
     ) -> None:
         self.step_s = step_s
-        self.wiring = wiring
         self._slave = Slave(
             description, [w.variable for w in wiring.inputs], [w.variable for w in wiring.outputs]
         )

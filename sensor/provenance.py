@@ -18,19 +18,24 @@ def versions() -> dict[str, str]:
             found[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             continue
-    commit = _commit()
-    return found | ({"commit": commit} if commit else {})
+    source = commit()
+    return found | ({"commit": source} if source else {})
 
 
-def _commit() -> str:
-    """Return the commit of the source tree, with `-dirty` if it was changed since; empty outside a
-    git tree.
-    """
-    command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+def commit() -> str | None:
+    """Return the git commit of these sources, with `+` if changed; None outside a checkout."""
+    here = Path(__file__).resolve()
     try:
-        done = subprocess.run(
-            command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False
-        )
-    except OSError:
-        return ""
-    return done.stdout.strip() if done.returncode == 0 else ""
+        # An installed copy may lie inside somebody else's checkout, whose commit says nothing.
+        _git(here, "ls-files", "--error-unmatch", here.name)
+        changed = _git(here, "status", "--porcelain", "-uno")
+        return _git(here, "rev-parse", "HEAD") + ("+" if changed else "")
+    except (OSError, subprocess.SubprocessError):
+        return None
+
+
+def _git(file: Path, *arguments: str) -> str:
+    done = subprocess.run(
+        ["git", *arguments], cwd=file.parent, capture_output=True, text=True, check=True, timeout=10
+    )
+    return done.stdout.strip()

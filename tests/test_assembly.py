@@ -108,7 +108,8 @@ def test_parameters_of_another_fmu(tmp_path: Path, kind: str, value: str) -> Non
 def test_another_fmu_may_have_names_that_are_taken_here(tmp_path: Path) -> None:
     odd = Variable("Init.x", 450, "parameter", start=1)
     parrot(tmp_path / "p.fmu", (*own_variables().values(), odd))
-    build(tmp_path, vehicle="{fmu: p.fmu, parameters: {Init.x: 3}}")
+    built = build(tmp_path, vehicle="{fmu: p.fmu, parameters: {Init.x: 3}}")
+    assert built.files["fmu"] == tmp_path / "p.fmu"
 
 
 def test_limits_of_another_fmu(tmp_path: Path) -> None:

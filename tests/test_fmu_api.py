@@ -175,7 +175,10 @@ def test_a_refused_call_sets_none_of_its_values(make: Make) -> None:
 def test_inputs_may_leave_their_range(make: Make) -> None:
     face = make().initialise()
     face["In.u"] = 11.0
+    before = face["Out.FL"]
     face.step(0)
+    assert face["In.u"] == 11.0
+    assert face["Out.FL"] > before  # on its way to 11 rad
 
 
 def test_unknown_references_and_types_are_refused(make: Make) -> None:

@@ -114,7 +114,7 @@ static void guess(Start *s, double y[UNKNOWNS]) {
         set_pose(s, y);
         evaluate(s);
         const Contact *t = s->w.contact;
-        const double wheelbase = p->Body_CogToFront + p->Body_CogToRear, track = s->c->track_front;
+        const double wheelbase = p->Body_CogToFront + p->Body_CogToRear, track = s->c->track;
         const double front = (t[FL].height + t[FR].height) / 2, rear = (t[RL].height + t[RR].height) / 2;
         const double left = (t[FL].height + t[RL].height) / 2, right = (t[FR].height + t[RR].height) / 2;
         y[1] = atan((left - right) / track);

@@ -16,7 +16,7 @@ static void corners(const Variables *p, Vehicle *c) {
     const double wheelbase = p->Body_CogToFront + p->Body_CogToRear, track = p->Body_CogToLeft + p->Body_CogToRight;
     const double weight = p->Body_Mass * p->Env_Gravity;
     c->carrier_mass = p->Body_UnsprungMass / CORNERS;
-    c->track_front = c->track_rear = track;
+    c->track = track;
     for (int i = 0; i < CORNERS; ++i) {
         const int front = i == FL || i == FR, left = i == FL || i == RL;
         const double load = weight * (front ? p->Body_CogToRear : p->Body_CogToFront) / wheelbase *

@@ -9,7 +9,7 @@ double ackermann(const Variables *p, const Vehicle *c, double rack, int i, doubl
     *gradient = 0.0;
     if (i == RL || i == RR) return 0.0;
     const double wheelbase = p->Body_CogToFront + p->Body_CogToRear;
-    const double gain = c->side[i] * p->Steer_Ackermann * c->track_front / (2 * wheelbase);
+    const double gain = c->side[i] * p->Steer_Ackermann * c->track / (2 * wheelbase);
     *gradient = 1 + 2 * gain * rack;
     return rack * (1 + gain * rack);
 }

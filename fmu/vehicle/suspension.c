@@ -81,8 +81,8 @@ static double damper_force(const Variables *p, const Vehicle *c, double valve, d
 
 void suspension_forces(const Variables *p, const Vehicle *c, const State *x, Work *w) {
     const double *q = x->travel;
-    const double front = bar_force(p->Susp_AntiRollFront, c->track_front, q[FL], q[FR]);
-    const double rear = bar_force(p->Susp_AntiRollRear, c->track_rear, q[RL], q[RR]);
+    const double front = bar_force(p->Susp_AntiRollFront, c->track, q[FL], q[FR]);
+    const double rear = bar_force(p->Susp_AntiRollRear, c->track, q[RL], q[RR]);
     const double bar[CORNERS] = {front, -front, rear, -rear};
     for (int i = 0; i < CORNERS; ++i) {
         const double bump = stop_force(p->Susp_BumpRate, p->Susp_BumpCubic, q[i] - p->Susp_BumpGap[i]);
@@ -94,7 +94,7 @@ void suspension_forces(const Variables *p, const Vehicle *c, const State *x, Wor
 
 double suspension_energy(const Variables *p, const Vehicle *c, const State *x) {
     const double *q = x->travel;
-    const double front = (q[FL] - q[FR]) / c->track_front, rear = (q[RL] - q[RR]) / c->track_rear;
+    const double front = (q[FL] - q[FR]) / c->track, rear = (q[RL] - q[RR]) / c->track;
     double energy = (p->Susp_AntiRollFront * front * front + p->Susp_AntiRollRear * rear * rear) / 2;
     for (int i = 0; i < CORNERS; ++i) {
         energy += q[i] * (c->preload[i] + p->Susp_WheelRate[i] * q[i] / 2);

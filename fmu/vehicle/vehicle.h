@@ -52,7 +52,7 @@ typedef struct {
     double side[CORNERS];
     double lateral_slope[CORNERS]; /* dy/dq of the wheel centre that gives the roll centre height */
     double preload[CORNERS];       /* spring force at q = 0, N */
-    double track_front, track_rear;
+    double track;
     Vec cog, seat, imu; /* of the whole vehicle; mounts; all from the reference point */
     double imu_axes[9]; /* IMU axes -> body axes */
     Curve passive, soft, hard;
