@@ -15,6 +15,7 @@ from vehicle_rig import (
     G,
     Record,
     Rig,
+    figure,
     parameter,
     run,
     steer_to,
@@ -103,6 +104,7 @@ def slope(record: Record, values: Array, low: float, high: float) -> float:
 def test_roll_gradient() -> None:
     record, analytic = slow_ramp(27.0, 4.0, 10.0), LinearCar().steady_turn()
     total = np.degrees(G * slope(record, record["Car.Roll"], 0.3, 3.0))
+    figure("roll gradient, FMU and analytic [deg/g]", total, np.degrees(G * analytic[ROLL]))
     assert total == pytest.approx(np.degrees(G * analytic[ROLL]), rel=0.015)
     assert total == pytest.approx(6.7, abs=0.2)
     for left, right in ((0, 1), (2, 3)):
@@ -164,11 +166,13 @@ def test_understeer_gradient() -> None:
         np.degrees(G * slope(record, extra_steer(record), low, high))  # [deg/g]
         for record, low, high in ((slow, 1.0, 4.0), (limit, 5.0, 6.0))
     )
+    figure("understeer, 1-4 and 5-6 m/s2 [deg/g]", everyday, late)
     assert 1.5 < everyday < late < 4.0
 
 
 def test_largest_lateral_acceleration() -> None:
     record = slow_ramp(22.2, 8.0, 25.0)
+    figure("largest lateral acceleration [g]", record["Car.ay"].max() / G)
     assert 0.80 < record["Car.ay"].max() / G < 0.86
     assert record["Car.ay"][-1] > 0.9 * record["Car.ay"].max()  # it pushes wide; it does not spin
     assert np.abs(record["Car.SideSlipAngle"]).max() < np.radians(8.0)

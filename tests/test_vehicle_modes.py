@@ -21,6 +21,7 @@ from vehicle_rig import (
     Rig,
     cosine_bump,
     each,
+    figure,
     linear_dampers,
     parameter,
     run,
@@ -52,6 +53,7 @@ def test_static_wheel_loads() -> None:
     with Rig() as rig:
         loads = [rig[f"Car.Fz{c}"] for c in CORNERS]
         travels = [rig[f"Car.C{c}.q0"] for c in CORNERS]
+    figure("static loads [N]", *loads)
     assert loads == pytest.approx(LinearCar().loads, abs=1e-3)
     assert loads == pytest.approx([5770, 5300, 6717, 6170], abs=1.0)
     assert np.abs(travels).max() < 1e-9
@@ -106,6 +108,8 @@ def test_eigenfrequencies(tmp_path: Path, kinematics: bool) -> None:
     record = free_response(tmp_path, kinematics)
     poles = matrix_pencil(record.corners("Car.C@.q0p")[400:], 0.01, order=14, window=120)
     found = np.sort(poles.imag[poles.imag > 0.1]) / (2.0 * np.pi)
+    figure("modes, FMU [Hz]", *found)
+    figure("modes, linearisation [Hz]", *modes_hz(kinematics))
     assert found == pytest.approx(modes_hz(kinematics), rel=1e-3)
     assert np.abs(poles.real).max() < 0.02  # nothing damps, nothing drives
 

@@ -16,6 +16,7 @@ from vehicle_rig import (
     Record,
     Rig,
     cosine_bump,
+    figure,
     output_names,
     parameter,
     run,
@@ -84,6 +85,8 @@ def mirror_run(folder: Path, sign: float) -> Record:
 
 def test_mirror_symmetry(tmp_path: Path) -> None:
     left, right = mirror_run(tmp_path, 1.0), mirror_run(tmp_path, -1.0)
+    loads = left.corners("Car.Fz@"), right.corners("Car.Fz@")[:, SWAPPED]
+    figure("mirror symmetry, Fz [-]", np.abs(loads[0] - loads[1]).max() / loads[0].max())
     for names, sign in ((EVEN, 1.0), (ODD, -1.0)):
         for name in names:
             a, b = left[name], sign * right[name]
@@ -127,6 +130,7 @@ def test_step_halving(rough: Callable[[str], str]) -> None:
 
     for name, at_default in (("Car.C@.q0p", 0.01), ("Car.Fz@", 0.003), ("Car.v@", 0.002)):
         fine, middle, default = errors(name)
+        figure(f"step halving, {name}, 1, 0.5, 0.25 ms [-]", default, middle, fine)
         assert default < at_default, name
         assert default > 3.0 * middle > 9.0 * fine, name
     for name in ("Car.ax", "Car.ay", "Car.az", "Car.RollVel", "Car.PitchVel", "Car.YawRate"):
@@ -152,6 +156,7 @@ def energy_error(record: Record) -> float:
 def test_energy_balance_on_the_flat() -> None:
     coast = run(8.0, {"Init.Velocity": 20.0, "Damp.Passive": True})
     assert coast["Energy.Dissipated"][-1] > 5e4
+    figure("energy, flat coast-down [-]", energy_error(coast))
     assert energy_error(coast) < 1e-6
 
 
@@ -164,6 +169,7 @@ def test_energy_balance_with_motors_brakes_and_steering() -> None:
     record = run(9.0, {"Init.Velocity": 15.0}, drive)
     assert record["Energy.Supplied"][-1] > 5e4
     assert record["Car.vx"][-1] < 1.0
+    figure("energy, motors, brakes and steering [-]", energy_error(record))
     assert energy_error(record) < 2e-5
 
 
@@ -177,8 +183,9 @@ def test_energy_balance_over_bumps(tmp_path: Path, rough: Callable[[str], str]) 
 
     columns = np.array([-4.5, -0.1, 0.1, 4.5])
     road = straight_road(tmp_path / "bumps.crg", bumps, columns=columns, length=200.0)
-    for file in (road, rough("C")):
+    for what, file in (("bumps", road), ("class C", rough("C"))):
         record = run(6.0, {"Init.Velocity": 15.0, "Road.File": file, "Damp.Passive": True})
+        figure(f"energy, {what} [-]", energy_error(record))
         assert energy_error(record) < 2e-3
 
 
@@ -213,6 +220,8 @@ def test_stands_on_a_hill_and_rolls_when_let_go(hill: str, brake: float) -> None
     resistance = parameter("Tire.QSY1") * parameter("Tire.Radius") / rolling
     force = mass * G * (np.sin(angle) - resistance * np.cos(angle))
     mean = (record["Car.vx"][3250] - record["Car.vx"][3100]) / 1.5
+    figure("10 % grade, largest motion held [m]", np.ptp(record["Car.ty"][held]))
+    figure("10 % grade, released and analytic [m/s2]", mean, -force / inertia)
     assert mean == pytest.approx(-force / inertia, rel=0.003)
 
 
