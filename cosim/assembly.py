@@ -21,8 +21,9 @@ from cosim.fmi import Description, Value
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, TRUTH, Quantity
 from cosim.recorder import Recorder, Signal
-from cosim.scenario.schema import Passive, Scenario
-from cosim.scenario.schema import Skyhook as SkyhookSettings
+from cosim.scenario.controllers import Passive
+from cosim.scenario.controllers import Skyhook as SkyhookSettings
+from cosim.scenario.schema import Scenario
 from cosim.speed_profile import STYLES, speed_profile, travel_time
 from cosim.start import builtin_start, checked_parameters
 from cosim.vehicle import RECORDED, Vehicle, builtin_fmu

@@ -19,7 +19,8 @@ from cosim.road import (
     load_track,
     track_of_file,
 )
-from cosim.scenario.schema import BumpSurface, IsoSurface, Scenario
+from cosim.scenario.schema import Scenario
+from cosim.scenario.surface import BumpSurface, IsoSurface
 
 
 @dataclass(frozen=True)

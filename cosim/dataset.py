@@ -141,8 +141,8 @@ def drive(planned: PlannedRun, directory: Path) -> str:
     """Drive one run without a sensor, write it, and return its stem."""
     from cosim.assembly import STEP_S, assemble
     from cosim.controller import SwitchingDampers
+    from cosim.scenario.controllers import Passive
     from cosim.scenario.load import load
-    from cosim.scenario.schema import Passive
     from sensor.dataset import Run, write_run
 
     scenario = load(planned.scenario, [f"seed={planned.seed}"])

@@ -11,7 +11,7 @@ from cosim.metrics import figure, metric_names, with_unit
 
 
 class Bounds(Protocol):
-    """What a limit asks for; `cosim.scenario.schema.Limit` is one."""
+    """What a limit asks for; `cosim.scenario.limit.Limit` is one."""
 
     @property
     def metric(self) -> str:

@@ -17,7 +17,8 @@ from typing import Any, Final, Protocol
 from cosim.errors import InputError, NetworkError
 from cosim.limits import Verdict, evaluate
 from cosim.recorder import Recorder, require_parquet
-from cosim.scenario.schema import Passive, Scenario, Skyhook
+from cosim.scenario.controllers import Passive, Skyhook
+from cosim.scenario.schema import Scenario
 
 Progress = Callable[[str, int, int], None]
 

@@ -10,7 +10,7 @@ from cosim.limits import check_metric, evaluate
 from cosim.metrics import COMFORT_FIGURES, ERROR_FIGURES, ESTIMATORS, figure, metric_names, unit_of
 from cosim.recorder import Recorder
 from cosim.run import finite
-from cosim.scenario.schema import Limit
+from cosim.scenario.limit import Limit
 from cosim.tables import comparison_table, estimate_table, plain
 
 

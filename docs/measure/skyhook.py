@@ -12,8 +12,8 @@ from cosim.assembly import assemble
 from cosim.controller import FixedDampers, Skyhook
 from cosim.dataset import NoSensor
 from cosim.loop import ControllerBlock
+from cosim.scenario.controllers import Skyhook as SkyhookSettings
 from cosim.scenario.load import load
-from cosim.scenario.schema import Skyhook as SkyhookSettings
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "closed_loop_class_c_50.yaml"
 GAINS = (1000.0, 2000.0, 3000.0, 3500.0, 4000.0, 6000.0, 8000.0, 12000.0)

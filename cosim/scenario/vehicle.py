@@ -1,0 +1,59 @@
+"""The vehicle of a scenario: its FMU, parameters and channel map."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from cosim.scenario.model import Model
+
+
+def _check_parameter(value: object) -> object:
+    if isinstance(value, bool | int | str) or (isinstance(value, float) and isfinite(value)):
+        return value
+    raise PydanticCustomError("parameter", "must be one finite number, true, false or text")
+
+
+class Variable(Model):
+    """Which variable of another vehicle FMU carries a quantity."""
+
+    name: str = Field(min_length=1, description="name of the variable in the FMU")
+    unit: str | None = Field(default=None, description="its unit, if the FMU does not say")
+    scale: float = Field(default=1.0, description="factor to the SI unit or to the sign used here")
+
+
+Parameter = Annotated[bool | float | str, BeforeValidator(_check_parameter)]
+
+
+class Vehicle(Model):
+    """The vehicle FMU and its parameters."""
+
+    fmu: str = Field(
+        default="builtin",
+        min_length=1,
+        description="'builtin', or an FMU relative to the scenario file",
+    )
+    fmi_version: Literal[2, 3] = Field(
+        default=3, description="which of the built-in FMUs; builtin only"
+    )
+    parameters: dict[str, Parameter] = Field(
+        default_factory=dict, description="start values by the FMU's own names, in its units"
+    )
+    variables: dict[str, Variable] = Field(
+        default_factory=dict, description="quantity to variable, for an FMU with other names"
+    )
+
+    @model_validator(mode="after")
+    def _builtin_only(self) -> Vehicle:
+        if self.fmu == "builtin" and self.variables:
+            raise PydanticCustomError(
+                "builtin", "variables maps another FMU's names; the built-in FMU needs none"
+            )
+        if self.fmu != "builtin" and "fmi_version" in self.model_fields_set:
+            raise PydanticCustomError(
+                "builtin", "fmi_version chooses a built-in FMU; another FMU states its own version"
+            )
+        return self
