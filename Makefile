@@ -7,7 +7,7 @@ SCENARIO ?= scenarios/laps/hockenheim_normal_class_a.yaml
 DATA ?= data/paper
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
-.PHONY: demo test check fmu dataset train gates figures benchmarks sanitize clean
+.PHONY: demo test check fmu dataset train validation figures benchmarks sanitize clean
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(SCENARIO)
@@ -41,8 +41,9 @@ fmu: $(VENV)/demo.stamp ## rebuild the FMUs after a change of the C sources
 sanitize: $(VENV)/test.stamp ## AddressSanitizer, UBSan and leak check over 50 lives of the vehicle FMU
 	$(BIN)/python fmu/build.py --sanitize
 
-gates: $(VENV)/test.stamp ## what the plant's gates measure: the table of docs/vehicle.md
-	$(BIN)/python -m pytest -q -s tests/test_vehicle_*.py | grep '^gate:'
+validation: $(VENV)/test.stamp ## all gates of the vehicle, the slow ones too: docs/validation
+	$(BIN)/python -m pip install --quiet -e '.[docs]'
+	$(BIN)/python -m pytest -q tests/test_vehicle*.py tests/test_road*.py --validation docs/validation
 
 dataset: $(VENV)/test.stamp ## the runs behind the published network (about three minutes)
 	$(BIN)/cosim dataset scenarios/datasets/paper.yaml --out $(DATA)

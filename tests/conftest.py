@@ -1,10 +1,42 @@
-"""What every test is given."""
+"""What every test is given, and `--validation FOLDER`: slow gates too, their page and pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--validation", type=Path, help="run the slow gates too; write their page and plots here"
+    )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--validation"):
+        return
+    slow = [item for item in items if item.get_closest_marker("validation")]
+    config.hook.pytest_deselected(items=slow)
+    items[:] = [item for item in items if item not in slow]
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    folder = session.config.getoption("--validation")
+    if folder:
+        from gates import write_page
+
+        write_page(folder)
+
+
+@pytest.fixture(scope="session")
+def plots(request: pytest.FixtureRequest) -> Path | None:
+    """Folder for the plots of `make validation`; None in the test suite."""
+    folder: Path | None = request.config.getoption("--validation")
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 @pytest.fixture(scope="session", autouse=True)

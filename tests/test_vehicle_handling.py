@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from gates import at_most, between, gate
 from vehicle_grip import cornering_stiffness, pneumatic_trail
 from vehicle_linear import ROLL, SIDE, TRAVEL, LinearCar, per_corner
 from vehicle_rig import (
@@ -15,12 +16,12 @@ from vehicle_rig import (
     G,
     Record,
     Rig,
-    figure,
     parameter,
     run,
     steer_to,
 )
 
+STEADY = "Steady cornering"
 LEFT, RIGHT = [0, 2], [1, 3]
 FRONT, REAR = slice(0, 2), slice(2, 4)
 
@@ -104,9 +105,9 @@ def slope(record: Record, values: Array, low: float, high: float) -> float:
 def test_roll_gradient() -> None:
     record, analytic = slow_ramp(27.0, 4.0, 10.0), LinearCar().steady_turn()
     total = np.degrees(G * slope(record, record["Car.Roll"], 0.3, 3.0))
-    figure("roll gradient, FMU and analytic [deg/g]", total, np.degrees(G * analytic[ROLL]))
-    assert total == pytest.approx(np.degrees(G * analytic[ROLL]), rel=0.015)
-    assert total == pytest.approx(6.7, abs=0.2)
+    off = abs(total / np.degrees(G * analytic[ROLL]) - 1.0)
+    gate(STEADY, "roll gradient [deg/g]", "6.0 to 7 typical of an SUV", total, between(6.0, 7.0))
+    gate(STEADY, "roll gradient, error [-]", "analytic linearisation", off, at_most(0.015))
     for left, right in ((0, 1), (2, 3)):
         travel = record.corners("Car.C@.q0")
         measured = slope(record, travel[:, right] - travel[:, left], 0.3, 3.0)
@@ -161,19 +162,23 @@ def extra_steer(record: Record) -> Array:
 def test_understeer_gradient() -> None:
     slow, limit = slow_ramp(27.0, 2.0, 15.0), slow_ramp(22.2, 8.0, 25.0)
     at_first = slope(slow, extra_steer(slow), 0.2, 0.8)
-    assert at_first == pytest.approx(understeer_gradient(), rel=0.08)
+    off = abs(at_first / understeer_gradient() - 1.0)
+    gate(STEADY, "understeer gradient below 0.8 m/s2, error [-]", "analytic", off, at_most(0.08))
     everyday, late = (
         np.degrees(G * slope(record, extra_steer(record), low, high))  # [deg/g]
         for record, low, high in ((slow, 1.0, 4.0), (limit, 5.0, 6.0))
     )
-    figure("understeer, 1-4 and 5-6 m/s2 [deg/g]", everyday, late)
-    assert 1.5 < everyday < late < 4.0
+    both = np.array([everyday, late])
+    check = "ISO 4138, constant speed: understeer gradient at 1 to 4 and 5 to 6 m/s2 [deg/g]"
+    gate(STEADY, check, "1.5 to 4, typical of the class", both, between(1.5, 4.0))
+    assert everyday < late
 
 
 def test_largest_lateral_acceleration() -> None:
     record = slow_ramp(22.2, 8.0, 25.0)
-    figure("largest lateral acceleration [g]", record["Car.ay"].max() / G)
-    assert 0.80 < record["Car.ay"].max() / G < 0.86
+    largest = float(record["Car.ay"].max() / G)
+    oracle = "0.80 to 0.85 for a static stability factor of 1.25"
+    gate(STEADY, "largest lateral acceleration [g]", oracle, largest, between(0.80, 0.85))
     assert record["Car.ay"][-1] > 0.9 * record["Car.ay"].max()  # it pushes wide; it does not spin
     assert np.abs(record["Car.SideSlipAngle"]).max() < np.radians(8.0)
 

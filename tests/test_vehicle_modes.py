@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
+from gates import at_most, between, gate
 from vehicle_grip import GripCar
 from vehicle_linear import PITCH, ROLL, SIDE, TRAVEL, LinearCar, Y, Z, per_corner
 from vehicle_rig import (
@@ -21,7 +22,6 @@ from vehicle_rig import (
     Rig,
     cosine_bump,
     each,
-    figure,
     linear_dampers,
     parameter,
     run,
@@ -31,6 +31,7 @@ from vehicle_rig import (
 from cosim.fmi import Value
 from cosim.road.track import DS
 
+REST, RESPONSE = "Rest and small motions", "Frequency responses"
 TWO_SIDES = np.array([-4.5, -0.3, 0.3, 4.5])  # columns of a road with a left and a right half
 NO_KINEMATICS = {
     k: v
@@ -53,10 +54,11 @@ def test_static_wheel_loads() -> None:
     with Rig() as rig:
         loads = [rig[f"Car.Fz{c}"] for c in CORNERS]
         travels = [rig[f"Car.C{c}.q0"] for c in CORNERS]
-    figure("static loads [N]", *loads)
+    printed = np.array([5770.0, 5300.0, 6717.0, 6170.0])
+    off = np.abs(loads - printed)
+    gate(REST, "static wheel loads FL FR RL RR, error [N]", "Table 1 of the study", off, at_most(1))
     assert loads == pytest.approx(LinearCar().loads, abs=1e-3)
-    assert loads == pytest.approx([5770, 5300, 6717, 6170], abs=1.0)
-    assert np.abs(travels).max() < 1e-9
+    gate(REST, "wheel travels at rest, largest [m]", "0", np.abs(travels).max(), at_most(1e-9))
     assert np.abs(LinearCar().gradient()).max() < 1e-3  # the linear model rests there too [N, N m]
 
 
@@ -71,7 +73,8 @@ def test_starts_in_equilibrium(speed: float) -> None:
         air = 0.5 * 1.2 * 2.6 * speed**2
         carried = parameter("Body.Mass") * G - air * (0.05 + 0.08 + 0.35 * rig["Car.Pitch"])
         assert sum(rig[f"Car.Fz{c}"] for c in CORNERS) == pytest.approx(carried, abs=0.1)
-    assert np.abs(accelerations).max() < 1e-5
+    largest = float(np.abs(accelerations).max())
+    gate(REST, f"start at {speed:g} m/s: largest acceleration [m/s2]", "0", largest, at_most(1e-5))
     assert np.abs(rates).max() == 0.0
     assert np.abs(travel_rates).max() == 0.0
 
@@ -108,18 +111,20 @@ def test_eigenfrequencies(tmp_path: Path, kinematics: bool) -> None:
     record = free_response(tmp_path, kinematics)
     poles = matrix_pencil(record.corners("Car.C@.q0p")[400:], 0.01, order=14, window=120)
     found = np.sort(poles.imag[poles.imag > 0.1]) / (2.0 * np.pi)
-    figure("modes, FMU [Hz]", *found)
-    figure("modes, linearisation [Hz]", *modes_hz(kinematics))
-    assert found == pytest.approx(modes_hz(kinematics), rel=1e-3)
+    error = np.abs(found / modes_hz(kinematics) - 1.0)
+    which = "with" if kinematics else "without"
+    what = f"modes {which} kinematics: heave pitch roll, four of wheel hop, error [-]"
+    gate(REST, what, "analytic linearisation (energy's Hessian)", error, at_most(1e-3))
     assert np.abs(poles.real).max() < 0.02  # nothing damps, nothing drives
 
 
 def test_ride_frequencies_are_an_suvs() -> None:
     heave, pitch, roll, *hop = modes_hz()
-    assert heave == pytest.approx(1.27, abs=0.03)
-    assert pitch == pytest.approx(1.55, abs=0.03)
-    assert 1.8 < roll < 2.6
-    assert 14.0 < min(hop) <= max(hop) < 15.5
+    typical = "typical of an SUV"
+    gate(REST, "heave frequency [Hz]", typical, heave, between(1.24, 1.30))
+    gate(REST, "pitch frequency [Hz]", typical, pitch, between(1.52, 1.58))
+    gate(REST, "roll frequency [Hz]", typical, roll, between(1.8, 2.6))
+    gate(REST, "wheel hop [Hz]", "from the unsprung mass of Table 1", hop, between(14, 15.5))
 
 
 # ---------------------------------------------------------------- frequency response
@@ -188,31 +193,40 @@ TRAVELS = {f"Car.C{c}.q0p": TRAVEL + i for i, c in enumerate(CORNERS)}
 SYMMETRIC = {"Car.az": Z, "Car.PitchVel": PITCH} | TRAVELS
 
 
+def enter(grip: str, road: str, ratios: Gains, most: float) -> None:
+    errors = {name: float(np.abs(ratio - 1.0).max()) for name, ratio in ratios.items()}
+    own = [name for name in errors if name not in TRAVELS]
+    names = ", ".join([*own, "four travel rates"])
+    check = f"driven over sines, {grip}, {road}: {names}: complex gain 0.5 to 14.5 Hz, error [-]"
+    measured = [errors[n] for n in own] + [max(errors[n] for n in TRAVELS)]
+    gate(RESPONSE, check, "analytic linearisation", measured, at_most(most))
+
+
 def test_heave_and_pitch_response(tmp_path: Path) -> None:
     record = multisine_run(tmp_path, antisymmetric=False, grip=False)
-    for name, ratio in gains(record, SYMMETRIC, LINEAR, np.ones(4)).items():
-        assert np.abs(ratio - 1.0).max() < 0.01, name
+    ratios = gains(record, SYMMETRIC, LINEAR, np.ones(4))
+    enter("no grip", "both sides", ratios, 0.01)
 
 
 def test_roll_response(tmp_path: Path) -> None:
     record = multisine_run(tmp_path, antisymmetric=True, grip=False)
-    for name, ratio in gains(record, {"Car.RollVel": ROLL} | TRAVELS, LINEAR, SIDE).items():
-        assert np.abs(ratio - 1.0).max() < 0.012, name
+    ratios = gains(record, {"Car.RollVel": ROLL} | TRAVELS, LINEAR, SIDE)
+    enter("no grip", "left against right", ratios, 0.012)
 
 
 def test_heave_and_pitch_response_with_grip(tmp_path: Path) -> None:
     """Longitudinal grip, which the linear car leaves out, ties pitch to the wheels' inertia."""
     record = multisine_run(tmp_path, antisymmetric=False, grip=True)
-    for name, ratio in gains(record, TRAVELS, GripCar(LINEAR, SPEED), np.ones(4)).items():
-        assert np.abs(ratio - 1.0).max() < 0.03, name
+    ratios = gains(record, TRAVELS, GripCar(LINEAR, SPEED), np.ones(4))
+    enter("grip", "both sides", ratios, 0.03)
 
 
 def test_roll_response_with_grip(tmp_path: Path) -> None:
     """Tyres that hold the car sideways change the roll altogether: less than half at 2.1 Hz."""
     record = multisine_run(tmp_path, antisymmetric=True, grip=True)
     names = {"Car.RollVel": ROLL, "Car.ay": Y} | TRAVELS
-    for name, ratio in gains(record, names, GripCar(LINEAR, SPEED), SIDE).items():
-        assert np.abs(ratio - 1.0).max() < 0.025, name
+    ratios = gains(record, names, GripCar(LINEAR, SPEED), SIDE)
+    enter("grip", "left against right", ratios, 0.025)
 
 
 def test_roll_stiffness_share() -> None:

@@ -20,11 +20,6 @@ from cosim.vehicle import builtin_fmu
 Array = npt.NDArray[np.float64]
 
 
-def figure(gate: str, *values: float) -> None:
-    """Print what a gate measured: `make gates` shows them, docs/vehicle.md quotes them."""
-    print(f"\ngate: {gate}: {' '.join(f'{value:.4g}' for value in values)}")
-
-
 CORNERS = ("FL", "FR", "RL", "RR")
 INPUTS = (
     "DM.Steer.Ang", "DM.Gas", "DM.Brake", "Road.Friction",
