@@ -181,7 +181,7 @@ def _start_values(
     scenario: Scenario, description: Description, course: Course, speed: float, passive: bool
 ) -> dict[str, Value]:
     """Return the start values; of ours, another FMU gets those that it has by the same names."""
-    own = builtin_start(course, speed, passive)
+    own = builtin_start(course, speed, passive, scenario.road.friction)
     known = {name: value for name, value in own.items() if name in description.variables}
     return known | scenario.vehicle.parameters
 

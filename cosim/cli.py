@@ -168,7 +168,8 @@ def _show(outcome: Outcome) -> None:
     failed = sum(not verdict.passed for verdict in outcome.verdicts)
     count = len(outcome.verdicts)
     verdict = f"{failed} of {count} limits FAILED" if failed else f"all {count} limits hold"
-    summary = verdict if count else "no limits set"
+    none = "no limits for this surface" if outcome.scenario.limits else "no limits set"
+    summary = verdict if count else none
     click.echo(f"{summary}; results in {outcome.output_dir}", err=True)
 
 

@@ -7,10 +7,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.errors import InputError
+from cosim.errors import InputError, Problem
 from cosim.road import (
     Bumps,
+    Cobbles,
+    Hump,
     Iso8608,
+    Obstacle,
+    Pothole,
     RoadError,
     Smooth,
     Surface,
@@ -19,8 +23,10 @@ from cosim.road import (
     load_track,
     track_of_file,
 )
+from cosim.scenario.obstacles import BumpRow, SpeedHump
+from cosim.scenario.obstacles import Obstacle as ObstacleSettings
 from cosim.scenario.schema import Scenario
-from cosim.scenario.surface import BumpSurface, IsoSurface
+from cosim.scenario.surface import CobbleSurface, IsoSurface
 
 
 @dataclass(frozen=True)
@@ -34,7 +40,8 @@ class Course:
 def course_of(scenario: Scenario, cache_dir: Path | None = None) -> Course:
     """Return the scenario's course, its road built unless the cache has it.
 
-    Raises `InputError` with the place in the scenario for a file that is no OpenCRG road.
+    Raises `InputError` with the place in the scenario for a file that is no OpenCRG road, and for
+    obstacles that the road cannot carry.
     """
     road = scenario.road
     try:
@@ -42,7 +49,8 @@ def course_of(scenario: Scenario, cache_dir: Path | None = None) -> Course:
             file = scenario.resolve(road.file).resolve()
             return Course(track_of_file(file), file)
         track = load_track(str(road.track), road.length_m)
-        return Course(track, build_road(track, _surface(scenario), cache_dir))
+        obstacles = _obstacles(scenario, track.length)
+        return Course(track, build_road(track, _surface(scenario), cache_dir, obstacles))
     except RoadError as error:
         key = ("road", "file") if road.file is not None else ("road",)
         raise InputError(scenario.problem(key, str(error))) from None
@@ -51,8 +59,60 @@ def course_of(scenario: Scenario, cache_dir: Path | None = None) -> Course:
 def _surface(scenario: Scenario) -> Surface:
     surface = scenario.road.surface
     if isinstance(surface, IsoSurface):
-        seed = scenario.seed if surface.seed is None else surface.seed
-        return Iso8608(surface.road_class, seed)
-    if isinstance(surface, BumpSurface):
-        return Bumps(surface.height_m, surface.length_m, surface.spacing_m)
+        return Iso8608(surface.road_class, _seed(scenario, surface.seed))
+    if isinstance(surface, CobbleSurface):
+        return Cobbles(
+            _seed(scenario, surface.seed),
+            surface.stone_length_m,
+            surface.stone_width_m,
+            surface.height_m,
+            surface.crown_m,
+            surface.road_class,
+        )
     return Smooth()
+
+
+def _seed(scenario: Scenario, own: int | None) -> int:
+    return scenario.seed if own is None else own
+
+
+def _obstacles(scenario: Scenario, length: float) -> list[Obstacle]:
+    """Return the obstacles; raises `InputError` with every one that does not fit on the road."""
+    obstacles: list[Obstacle] = []
+    problems: list[Problem] = []
+    for index, settings in enumerate(scenario.road.obstacles):
+        key = ("road", "obstacles", index)
+        try:
+            obstacle = _obstacle(settings, length)
+        except RoadError as error:
+            problems.append(scenario.problem(key, str(error)))
+            continue
+        obstacles.append(obstacle)
+        if obstacle.end > length:
+            sentence = (
+                f"the {obstacle.name} ends at {obstacle.end:g} m, behind the road's end at "
+                f"{length:g} m"
+            )
+            problems.append(scenario.problem(key, sentence))
+    if problems:
+        raise InputError(problems)
+    return obstacles
+
+
+def _obstacle(settings: ObstacleSettings, road_length: float) -> Obstacle:
+    if isinstance(settings, BumpRow):
+        last = road_length if settings.to_m is None else settings.to_m
+        return Bumps(
+            settings.height_m, settings.length_m, settings.spacing_m, settings.from_m, last
+        )
+    if isinstance(settings, SpeedHump):
+        return Hump(settings.at_m, settings.height_m, settings.length_m, settings.side)
+    return Pothole(
+        settings.at_m,
+        settings.depth_m,
+        settings.length_m,
+        settings.width_m,
+        settings.side,
+        settings.edge_m,
+        settings.offset_m,
+    )

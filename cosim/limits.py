@@ -25,10 +25,16 @@ class Bounds(Protocol):
     def max(self) -> float | None:
         """Largest value that passes."""
 
+    @property
+    def surface(self) -> str | None:
+        """The only surface that it counts on; None for all."""
+
 
 @dataclass(frozen=True)
 class Verdict:
-    """One limit in one run. `value` is None where the run has no such figure, which fails."""
+    """One limit in one run. `value` is None where the run has no such figure, which fails;
+    `surface` is the one that the limit is made for.
+    """
 
     run: str
     metric: str
@@ -36,13 +42,15 @@ class Verdict:
     min: float | None
     max: float | None
     passed: bool
+    surface: str | None = None
 
     @property
     def required(self) -> str:
         """What was asked for, in words."""
         low = f"at least {with_unit(self.min, self.metric)}" if self.min is not None else ""
         high = f"at most {with_unit(self.max, self.metric)}" if self.max is not None else ""
-        return " and ".join(words for words in (low, high) if words)
+        on = f" (surface {self.surface})" if self.surface is not None else ""
+        return " and ".join(words for words in (low, high) if words) + on
 
     @property
     def measured(self) -> str:
@@ -67,6 +75,11 @@ def check_metric(metric: str, labels: Sequence[str]) -> str | None:
     return f"'{metric}' is not a metric{hint or ', such as network.overall.accuracy_percent'}"
 
 
+def on_surface(limits: Iterable[Bounds], surface: str | None) -> list[Bounds]:
+    """Return the limits that count on a surface; None stands for a road file's own."""
+    return [limit for limit in limits if limit.surface in (None, surface)]
+
+
 def evaluate(limits: Iterable[Bounds], runs: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
     """Return one verdict per limit and run, or for one run where the limit begins with its name."""
     verdicts = []
@@ -81,5 +94,6 @@ def evaluate(limits: Iterable[Bounds], runs: Mapping[str, Mapping[str, Any]]) ->
                 and (limit.max is None or value <= limit.max)
                 and value == value
             )
-            verdicts.append(Verdict(run, path, value, limit.min, limit.max, passed))
+            bounds = limit.min, limit.max
+            verdicts.append(Verdict(run, path, value, *bounds, passed, limit.surface))
     return verdicts

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol
 
 from cosim.errors import InputError, NetworkError
-from cosim.limits import Verdict, evaluate
+from cosim.limits import Bounds, Verdict, evaluate, on_surface
 from cosim.recorder import Recorder, require_parquet
 from cosim.scenario.controllers import Passive, Skyhook
 from cosim.scenario.schema import Scenario
@@ -221,7 +221,8 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
     from cosim.compare import paper_figures
 
     figures = {run.label: run.figures for run in runs}
-    verdicts = (*evaluate(scenario.limits, figures), *_unfinished(scenario, figures))
+    limits = on_surface(scenario.limits, scenario.road.surface_name)
+    verdicts = (*evaluate(limits, figures), *_unfinished(scenario, figures))
     metrics = finite(
         {
             "scenario": scenario.name,
@@ -231,7 +232,18 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
         }
     )
     _write_json(output_dir / "metrics.json", metrics)
-    return Outcome(scenario, output_dir, runs, verdicts, metrics)
+    return Outcome(scenario, output_dir, runs, verdicts, metrics, _left_out(scenario, limits))
+
+
+def _left_out(scenario: Scenario, counted: Sequence[Bounds]) -> tuple[str, ...]:
+    """Return a note on the limits that are made for other surfaces than this one."""
+    left = len(scenario.limits) - len(counted)
+    if not left:
+        return ()
+    what = "1 limit is" if left == 1 else f"{left} limits are"
+    others = {limit.surface for limit in scenario.limits if limit not in counted}
+    names = ", ".join(sorted(str(name) for name in others))
+    return (f"{what} for another surface ({names}) and left out on {scenario.road.surface_name}",)
 
 
 def _is_papers(scenario: Scenario) -> bool:
@@ -283,7 +295,8 @@ def resolved_yaml(scenario: Scenario) -> str:
 
     data = scenario.model_dump(mode="json", by_alias=True, exclude_none=True)
     if scenario.road.file is not None:
-        data["road"] = {"file": str(scenario.resolve(scenario.road.file).resolve())}
+        data["road"]["file"] = str(scenario.resolve(scenario.road.file).resolve())
+        del data["road"]["surface"], data["road"]["obstacles"]
     if scenario.vehicle.fmu != "builtin":
         data["vehicle"]["fmu"] = str(scenario.resolve(scenario.vehicle.fmu).resolve())
         del data["vehicle"]["fmi_version"]

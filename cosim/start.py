@@ -10,19 +10,24 @@ from cosim.fmi import KINDS, Description, Value
 from cosim.quantities import INPUT_QUANTITIES
 from cosim.scenario.schema import Scenario
 
+FRICTION: Final = "Road.Friction"  # an input of the built-in FMU: set once, it is held
+
 # Set from the scenario's other fields; a second setting under parameters would contradict them.
 _TAKEN: Final = {
     "Road.File": "road", "Init.x": "road", "Init.y": "road", "Init.Yaw": "road",
     "Init.Velocity": "driver.speed_kmh", "Damp.Passive": "controllers",
+    FRICTION: "road.friction",
 }  # fmt: skip
 
 
-def builtin_start(course: Course, speed: float, passive: bool) -> dict[str, Value]:
+def builtin_start(
+    course: Course, speed: float, passive: bool, friction: float | None
+) -> dict[str, Value]:
     """Return the start values that put the package's own vehicle at s = 0 of the road, rolling at
-    `speed` [m/s].
+    `speed` [m/s]; `friction` scales the tyres', None leaves it as it is.
     """
     pose = course.track.pose(0.0)
-    return {
+    start: dict[str, Value] = {
         "Init.x": pose.x,
         "Init.y": pose.y,
         "Init.Yaw": pose.heading,
@@ -30,11 +35,12 @@ def builtin_start(course: Course, speed: float, passive: bool) -> dict[str, Valu
         "Damp.Passive": passive,
         "Road.File": str(course.file),
     }
+    return start if friction is None else start | {FRICTION: friction}
 
 
 def checked_parameters(scenario: Scenario, description: Description) -> list[Problem]:
-    """Return what is wrong with `vehicle.parameters`: names, types, ranges, and settings made
-    elsewhere.
+    """Return what is wrong with `vehicle.parameters`: names, types, ranges, settings made
+    elsewhere; and a friction that the FMU cannot take.
     """
     own = scenario.vehicle.fmu == "builtin"
     parameters = {
@@ -45,6 +51,12 @@ def checked_parameters(scenario: Scenario, description: Description) -> list[Pro
     mapped = scenario.vehicle.variables
     written = {mapped[q.name].name if q.name in mapped else q.variable for q in INPUT_QUANTITIES}
     problems = []
+    if scenario.road.friction is not None and FRICTION not in parameters:
+        sentence = (
+            f"'{description.path.name}' has no input '{FRICTION}' for the road's friction; "
+            "leave road.friction out, and set the FMU's own under vehicle.parameters"
+        )
+        problems.append(scenario.problem(("road", "friction"), sentence))
     for name, value in scenario.vehicle.parameters.items():
         key = ("vehicle", "parameters", name)
         variable = parameters.get(name)

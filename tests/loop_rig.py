@@ -43,7 +43,8 @@ def write_scenario(
     *,
     duration: str = "1",
     length_m: float = 150,
-    surface: str = "{kind: smooth}",
+    surface: str = "smooth",
+    obstacles: str = "",
     sections: Mapping[str, str] | None = None,
     name: str = "scenario",
 ) -> Path:
@@ -51,7 +52,8 @@ def write_scenario(
     fields = {
         "name": "a straight road",
         "duration": duration,
-        "road": f"{{track: straight, length_m: {length_m}, surface: {surface}}}",
+        "road": f"{{track: straight, length_m: {length_m}, surface: {surface}, "
+        f"obstacles: [{obstacles}]}}",
         "driver": "{speed_kmh: 50}",
     } | dict(sections or {})
     path = folder / f"{name}.yaml"

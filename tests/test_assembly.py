@@ -65,6 +65,7 @@ def driven(folder: Path, duration: str = SHORT, length_m: float = 150, **section
         ("Road.File: road.crg", "'Road.File' is set by road; use that"),
         ("Init.Velocity: 3", "'Init.Velocity' is set by driver.speed_kmh; use that"),
         ("Damp.Passive: true", "'Damp.Passive' is set by controllers; use that"),
+        ("Road.Friction: 0.4", "'Road.Friction' is set by road.friction; use that"),
     ],
 )
 def test_a_parameter_that_does_not_fit(tmp_path: Path, parameter: str, sentence: str) -> None:
@@ -84,6 +85,48 @@ def test_parameters_at_the_ends_of_their_range_reach_the_fmu(tmp_path: Path) -> 
     plain = driven(tmp_path, "1", driver="{speed_kmh: 120}")
     speed = [run.recorder.group("channels")[-1, 6] for run in (free, plain)]
     assert speed[0] > speed[1] + 0.05  # the driver reckons with a drag that is not there
+
+
+def test_the_friction_of_the_road_reaches_the_tyres_and_lasts(tmp_path: Path) -> None:
+    """On ice the car leaves the rural road's first lane change, on dry asphalt it does not."""
+    astray = {}
+    for friction in (0.1, 1.0):
+        road = f"{{track: rural, friction: {friction}}}"
+        car = driven(tmp_path, "14", road=road, driver="{style: normal}")
+        astray[friction] = car.driver.largest_deviation
+    assert astray[0.1] > 1.2 > 0.6 > astray[1.0]
+
+
+def test_another_fmu_without_an_input_for_friction(tmp_path: Path) -> None:
+    parrot(tmp_path / "p.fmu", tuple(own_variables().values()))
+    (complaint,) = complaints(
+        tmp_path, road="{track: straight, length_m: 150, friction: 0.4}", vehicle="{fmu: p.fmu}"
+    )
+    assert "scenario.yaml:3:" in complaint
+    assert "'p.fmu' has no input 'Road.Friction' for the road's friction" in complaint
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "sentence"),
+    [
+        ("{kind: hump, at_m: 149, height_m: 0.1, length_m: 2}", "hump ends at 151 m, behind the"),
+        ("{kind: hump, at_m: 50, height_m: 0.1, length_m: 0.1}", "is too short for the road's gr"),
+        (
+            "{kind: bumps, height_m: 0.1, length_m: 1, spacing_m: 3, to_m: 15}",
+            "no room for a bump of 1 m between 15 m and 15 m",
+        ),
+    ],
+)
+def test_every_obstacle_that_does_not_fit_is_shown_in_place(
+    tmp_path: Path, obstacle: str, sentence: str
+) -> None:
+    path = write_scenario(tmp_path, obstacles=f"{obstacle}, {obstacle}")
+    scenario = load(path)
+    with pytest.raises(InputError) as caught:
+        assemble(scenario, scenario.controllers[0], sensor=Blind())
+    found = [str(problem) for problem in caught.value.problems]
+    assert len(found) == 2
+    assert all("scenario.yaml:3:" in one and sentence in one for one in found)
 
 
 def test_an_input_that_the_loop_writes_is_no_parameter(tmp_path: Path) -> None:
@@ -203,11 +246,11 @@ def test_a_road_file_of_the_users_own(tmp_path: Path) -> None:
 def test_comfort_leaves_the_start_out(tmp_path: Path) -> None:
     """There are figures from two seconds on after the first two."""
     bumps = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 5}"
-    scenario = load(write_scenario(tmp_path, duration="4.5", surface=bumps))
+    scenario = load(write_scenario(tmp_path, duration="4.5", obstacles=bumps))
     figures = assemble(scenario, scenario.controllers[0], sensor=Blind()).run(None).comfort
     assert set(figures) == {"weighted_acceleration_m_s2", "deflection_rms_m", "tyre_load_rms_n"}
     assert all(value > 0 for value in figures.values())
-    scenario = load(write_scenario(tmp_path, duration="3.9", surface=bumps))
+    scenario = load(write_scenario(tmp_path, duration="3.9", obstacles=bumps))
     assert not assemble(scenario, scenario.controllers[0], sensor=Blind()).run(None).comfort
 
 
@@ -217,7 +260,7 @@ def test_comfort_leaves_the_start_out(tmp_path: Path) -> None:
 def test_passive_dampers_are_the_fmus_own_curve(tmp_path: Path) -> None:
     """Not the soft end of the semi-active ones, which command 0 would be."""
     bumps = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 5}"
-    scenario = load(write_scenario(tmp_path, duration="2", surface=bumps))
+    scenario = load(write_scenario(tmp_path, duration="2", obstacles=bumps))
     runs = []
     for dampers in (None, FixedDampers(0.0)):
         built = assemble(scenario, scenario.controllers[0], Blind(), dampers)

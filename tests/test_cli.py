@@ -69,6 +69,19 @@ def test_exit_code_1_when_a_limit_fails(cosim):
     assert "1 of 1 limits FAILED" in result.stderr
 
 
+def test_limits_for_another_surface_are_left_out_and_said(cosim):
+    limits = "limits=[{metric: zero.overall.accuracy_percent, min: 50, surface: A}]"
+    result = cosim("lap.yaml", "--set", limits)
+    assert result.exit_code == 0
+    assert "note: 1 limit is for another surface (A) and left out on smooth" in result.stderr
+    assert "no limits for this surface" in result.stderr
+    assert "left out on smooth" in Path("results/lap/report.html").read_text()
+    result = cosim("lap.yaml", "--set", limits, "--set", "road.surface=A")
+    assert result.exit_code == 1
+    assert "(surface A)" in result.stderr
+    assert json.loads(Path("results/lap/metrics.json").read_text())["limits"][0]["surface"] == "A"
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

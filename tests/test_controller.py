@@ -10,7 +10,7 @@ import pytest
 
 from cosim.controller import DamperMap, FixedDampers, Skyhook, SwitchingDampers
 from cosim.fmi import Description, Slave, Value
-from cosim.road import Bumps, build_road, load_track
+from cosim.road import Bumps, Smooth, build_road, load_track
 from cosim.vehicle import builtin_fmu
 from sensor.body_motion import BodyMotion
 
@@ -241,7 +241,7 @@ def test_the_scales_are_the_fmus_default() -> None:
 def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[float, tuple[Array, Array]]:
     """Command to suspension velocities and wheel forces of the FMU, (samples, 4) each."""
     folder = tmp_path_factory.mktemp("road")
-    road = build_road(load_track("straight", 300.0), Bumps(0.06, 1.2, 7.0), folder)
+    road = build_road(load_track("straight", 300.0), Smooth(), folder, [Bumps(0.06, 1.2, 7.0)])
     ratio = np.array([parameter(f"Damp.MotionRatio{corner}") for corner in CORNERS])
     outputs = [f"Car.C{c}.q0p" for c in CORNERS] + [f"Car.Damp{c}.Frc" for c in CORNERS]
     inputs = [f"Car.SuspControl.Damper{c}.CtrlOut" for c in CORNERS]

@@ -43,7 +43,7 @@ CLASS_B = "{kind: iso8608, class: B}"
 
 def short(
     folder: Path, name: str = "a_short", duration: str = "lap", surface: str = CLASS_B,
-    controllers: str = "[{kind: passive}]",
+    obstacles: str = "", controllers: str = "[{kind: passive}]",
 ) -> Path:  # fmt: skip
     """Twenty-five metres, less than two seconds."""
     return write_scenario(
@@ -52,6 +52,7 @@ def short(
         duration=duration,
         length_m=25,
         surface=surface,
+        obstacles=obstacles,
         sections={"controllers": controllers},
     )
 
@@ -187,7 +188,11 @@ def test_the_seed_is_that_of_the_surface(tmp_path: Path) -> None:
 
 
 def test_dampers_that_switch_are_driven_and_noted(tmp_path: Path) -> None:
-    path = short(tmp_path, surface="{kind: bumps, height_m: 0.03, length_m: 0.5, spacing_m: 4}")
+    path = short(
+        tmp_path,
+        surface="smooth",
+        obstacles="{kind: bumps, height_m: 0.03, length_m: 0.5, spacing_m: 4}",
+    )
     passive = recorded(PlannedRun(path, "passive", 5), tmp_path / "data")
     switching = recorded(PlannedRun(path, "switching", 5), tmp_path / "data")
     other = recorded(PlannedRun(path, "switching", 6), tmp_path / "other")

@@ -17,7 +17,7 @@ from foreign_fmu import Variable, own_variables, parrot, repackage, variables_of
 
 from cosim.errors import FmuError
 from cosim.fmi import Description, Slave, Value
-from cosim.road import Bumps, build_road, load_track
+from cosim.road import Bumps, Smooth, build_road, load_track
 from cosim.vehicle import builtin_fmu
 
 Array = npt.NDArray[np.float64]
@@ -33,7 +33,10 @@ INPUTS = (
 def start(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Value]:
     """Start values of every type: on bumps, at 15 m/s."""
     road = build_road(
-        load_track("straight", 100.0), Bumps(0.03, 0.5, 4.0), tmp_path_factory.mktemp("road")
+        load_track("straight", 100.0),
+        Smooth(),
+        tmp_path_factory.mktemp("road"),
+        [Bumps(0.03, 0.5, 4.0)],
     )
     return {"Road.File": str(road), "Init.Velocity": 15.0, "SlipControl.Active": False}
 

@@ -274,7 +274,7 @@ def figures(folder: Path) -> dict[str, Any]:
 
 def test_estimates_count_from_the_first_full_window_on(tmp_path: Path) -> None:
     outcome = execute(
-        load(write_scenario(tmp_path, surface=BUMPS)), tmp_path / "out", None, guessing
+        load(write_scenario(tmp_path, obstacles=BUMPS)), tmp_path / "out", None, guessing
     )
     record = outcome.runs[0].recorder
     estimate, truth = record.group("estimate"), record.group("truth")
@@ -379,7 +379,7 @@ def test_controllers_differ_only_from_when_they_may_act(closed_loop: Path) -> No
 
 def test_telling_progress_changes_nothing(tmp_path: Path) -> None:
     told = []
-    path = write_scenario(tmp_path, surface=BUMPS)
+    path = write_scenario(tmp_path, obstacles=BUMPS)
     first, second = build(path, Guess()), build(path, Guess())
     first.run(None)
     second.run(lambda done, total: told.append(done))

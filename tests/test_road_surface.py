@@ -1,4 +1,6 @@
-"""Unevenness: spectra and coherence where wheels run, bumps, determinism (cosim.road.surface)."""
+"""Unevenness: spectra and coherence where wheels run, determinism (cosim.road.surface,
+.iso8608).
+"""
 
 from __future__ import annotations
 
@@ -7,10 +9,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy import signal
+from scipy import interpolate, signal
 
-from cosim.road import Bumps, Iso8608, RoadError, Smooth
-from cosim.road.surface import ROUGHNESS, surface_key
+from cosim.road import Iso8608, RoadError, Smooth
+from cosim.road.iso8608 import ROUGHNESS
+from cosim.road.surface import finer_grid, finer_sections, on_columns
 from cosim.road.track import DS
 
 Floats = npt.NDArray[np.float64]
@@ -43,7 +46,7 @@ def band_ratios(line: Floats, road_class: str) -> Floats:
     return np.array([ratio[band].mean() for band in bands])
 
 
-@pytest.mark.parametrize("road_class", ["A", "D"])
+@pytest.mark.parametrize("road_class", ["A", "B", "C", "D"])
 def test_the_spectrum_at_the_wheels_is_the_class(road_class: str) -> None:
     lines = rides(Iso8608(road_class, 1), LEFT, RIGHT, LEFT - 0.3, RIGHT + 0.12)
     ratios = np.array([band_ratios(line, road_class) for line in lines])
@@ -99,34 +102,20 @@ def test_columns_are_dense_where_wheels_run() -> None:
     assert len(Iso8608("A", 1).columns(S[:8000])) == 91
 
 
-def test_bumps_alternate_from_side_to_side() -> None:
-    bumps = Bumps(height=0.03, length=0.5, spacing=4.0)
-    v = bumps.columns(S)
-    z = bumps.elevation(S, v)
-    left, right = z[:, np.argmin(np.abs(v - 0.3))], z[:, np.argmin(np.abs(v + 0.3))]
-    assert left.max() == pytest.approx(0.03, rel=1e-3)
-    assert not (left * right).any()
-    tops = S[signal.find_peaks(left)[0]]
-    assert np.diff(tops) == pytest.approx(4.0, abs=2 * DS)
-    assert S[signal.find_peaks(right)[0]][0] - tops[0] == pytest.approx(2.0, abs=2 * DS)
-    assert not z[S < 15.0].any()
-
-
 def test_smooth_is_smooth() -> None:
     assert not Smooth().elevation(S, Smooth().columns(S)).any()
 
 
-def test_keys_tell_surfaces_apart() -> None:
-    surfaces = [
-        Smooth(),
-        Iso8608("A", 1),
-        Iso8608("A", 2),
-        Iso8608("B", 1),
-        Bumps(0.03, 0.5, 4.0),
-        Bumps(0.03, 0.5, 5.0),
-    ]
-    assert len({surface_key(s) for s in surfaces}) == len(surfaces)
-    assert surface_key(Iso8608("A", 1)) == surface_key(Iso8608("A", 1))
+def test_more_columns_and_sections_are_the_same_surface() -> None:
+    """Bilinear interpolation, as OpenCRG readers have it, against SciPy's."""
+    s, surface = S[:600], Iso8608("C", 4)
+    v = surface.columns(s)
+    grid = surface.elevation(s, v)
+    finer_s, finer_v = finer_sections(s), np.unique(np.append(v, [-0.612, 0.333, 0.777]))
+    finer = on_columns(finer_grid(grid), v, finer_v)
+    oracle = interpolate.RegularGridInterpolator((s, v), grid.astype(float))
+    places = np.stack(np.meshgrid(finer_s, finer_v, indexing="ij"), axis=-1)
+    assert finer == pytest.approx(oracle(places), abs=1e-8)
 
 
 def test_bad_surfaces_are_refused() -> None:
@@ -134,7 +123,3 @@ def test_bad_surfaces_are_refused() -> None:
         Iso8608("F", 1)
     with pytest.raises(RoadError, match="seed is -1"):
         Iso8608("A", -1)
-    with pytest.raises(RoadError, match="height is 0 m; it must be positive"):
-        Bumps(0.0, 0.5, 4.0)
-    with pytest.raises(RoadError, match=r"spacing of 0\.3 m is less than"):
-        Bumps(0.03, 0.5, 0.3)

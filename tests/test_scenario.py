@@ -112,6 +112,26 @@ def test_a_field_in_the_wrong_section_is_sent_to_the_right_one(tmp_path):
         ("name: a\nroad: {file: a.txt}\n", "an OpenCRG road (.crg)"),
         ("name: a\nroad: {track: rural, surface: {kind: iso8608}}\n", "has no class"),
         ("name: a\nroad: {track: rural, surface: {class: A}}\n", "has no kind"),
+        ("name: a\nroad: {track: rural, surface: a}\n", "not 'a'; did you mean 'A'?"),
+        ("name: a\nroad: {track: rural, surface: 3}\n", "road.surface must be smooth, A, B, C, D"),
+        (
+            "name: a\nroad: {track: rural, surface: {kind: cobbels}}\n",
+            "kind must be cobbles, iso8608 or smooth, not 'cobbels'; did you mean 'cobbles'?",
+        ),
+        (
+            "name: a\nroad: {track: rural, surface: {kind: bumps}}\n",
+            "kind bumps lies on a surface: put it under road.obstacles",
+        ),
+        (
+            "name: a\nroad: {track: rural, obstacles: [{kind: pothol}]}\n",
+            "road.obstacles.0.kind must be bumps, hump or pothole, not 'pothol'; did you mean",
+        ),
+        (
+            "name: a\nroad: {track: rural, obstacles: [{kind: hump, at_m: 1, height_m: 1}]}\n",
+            "road.obstacles.0.at_m must be at least 3 m, not 1 m",
+        ),
+        ("name: a\nroad: {track: rural, friction: 0}\n", "road.friction must be at least 0.05"),
+        (GOOD + "limits: [{metric: lap_time_s, max: 9, surface: E}]\n", "limits.0.surface must be"),
         (GOOD + "limits: [{metric: lap_time_s}]\n", "needs min, max or both"),
         (GOOD + "limits: [{metric: lap_time_s, min: 2, max: 1}]\n", "not be greater than max"),
         (GOOD + "controllers: []\n", "controllers must not be empty"),
@@ -196,6 +216,45 @@ def test_an_override_mends_what_the_file_has_wrong(tmp_path):
     path.write_text("name: x\nroad: {track: nowhere}\ndriver: {style: wild}\n")
     scenario = load(path, ["road={track: rural}", "driver.style=normal"])
     assert scenario.road.track == "rural"
+
+
+@pytest.mark.parametrize(
+    ("word", "name", "kind"),
+    [
+        ("smooth", "smooth", "smooth"),
+        ("D", "D", "iso8608"),
+        ("cobbles", "cobbles", "cobbles"),
+        ("{kind: iso8608, class: A, seed: 3}", "A", "iso8608"),
+        ("{kind: cobbles, class: B}", "cobbles", "cobbles"),
+    ],
+)
+def test_a_surface_is_a_word_or_a_mapping(good, word, name, kind):
+    surface = load(good, [f"road.surface={word}"]).road.surface
+    assert (surface.name, surface.kind) == (name, kind)
+
+
+def test_a_resolved_scenario_with_all_of_a_road_loads_again(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text(
+        "name: x\nroad:\n  track: rural\n  surface: B\n  friction: 0.4\n  obstacles:\n"
+        "    - {kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 4, to_m: 60}\n"
+        "    - {kind: hump, at_m: 80, height_m: 0.1, length_m: 4, side: left}\n"
+        "    - {kind: pothole, at_m: 100, depth_m: 0.05, length_m: 0.6, width_m: 0.5}\n"
+        "limits: [{metric: lap_time_s, max: 200, surface: B}]\n"
+    )
+    again = tmp_path / "again.yaml"
+    again.write_text(resolved_yaml(load(path)))
+    assert load(again).road == load(path).road
+    assert load(again).limits == load(path).limits
+
+
+def test_a_limit_of_a_surface_needs_a_surface(tmp_path):
+    (tmp_path / "my.crg").touch()
+    limits = "limits: [{metric: lap_time_s, max: 1, surface: A}]\n"
+    found = problems(tmp_path, "name: x\nroad: {file: my.crg}\n" + limits)
+    assert "a limit's surface belongs to a track" in found[0][2]
+    found = problems(tmp_path, "name: x\nroad: {file: my.crg, obstacles: []}\n")
+    assert "a road file has its own" in found[0][2]
 
 
 def test_names_with_dots_stay_whole_below_the_vehicle(good):

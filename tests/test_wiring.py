@@ -408,8 +408,8 @@ def test_another_fmu_in_the_vehicles_place_gives_the_same_bits(
     version: int, tmp_path: Path
 ) -> None:
     """Closed loop over the driver, so that one wrong bit anywhere would grow."""
-    surface = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 4}"
-    own = run(write_scenario(tmp_path, duration="2", surface=surface))
+    obstacles = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 4}"
+    own = run(write_scenario(tmp_path, duration="2", obstacles=obstacles))
     start = {
         "Road.File": f"'{own.files['road']}'",
         "Init.Velocity": str(50 / 3.6),
@@ -419,7 +419,7 @@ def test_another_fmu_in_the_vehicles_place_gives_the_same_bits(
     parameters = "{" + ", ".join(f"{n}: {v}" for n, v in start.items()) + "}"
     vehicle = f"{{fmu: other.fmu, variables: {variables}, parameters: {parameters}}}"
     other = run(
-        write_scenario(tmp_path, duration="2", surface=surface, sections={"vehicle": vehicle})
+        write_scenario(tmp_path, duration="2", obstacles=obstacles, sections={"vehicle": vehicle})
     )
     for group in ("channels", "truth", "driver", "vehicle"):
         np.testing.assert_array_equal(other.recorder.group(group), own.recorder.group(group))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from uuid import uuid4
 
 from cosim.road.crg import WRITER_VERSION, write_crg
 from cosim.road.errors import RoadError
-from cosim.road.surface import Surface, surface_key
+from cosim.road.grid import road_grid
+from cosim.road.obstacles import Obstacle
+from cosim.road.surface import Surface
 from cosim.road.track import Track
 
 
@@ -19,24 +22,30 @@ def default_cache_dir() -> Path:
     return Path(named) if named else Path.home() / ".cache" / "suspension-cosim"
 
 
-def build_road(track: Track, surface: Surface, cache_dir: Path | None = None) -> Path:
-    """Return the OpenCRG file of `track` with `surface`, from `cache_dir` if it was built before.
+def build_road(
+    track: Track,
+    surface: Surface,
+    cache_dir: Path | None = None,
+    obstacles: Sequence[Obstacle] = (),
+) -> Path:
+    """Return the OpenCRG file of `track` with `surface` and the `obstacles` laid over it, from
+    `cache_dir` if it was built before.
 
     The file's name carries a hash of all that it is made from, and it appears whole or not at all,
     so any number of processes may build the same road. Raises `RoadError` if the cache cannot be
-    written.
+    written or the road would be too large.
     """
     directory = default_cache_dir() if cache_dir is None else cache_dir
-    path = directory / f"{track.name}-{surface.label}-{_key(track, surface)[:16]}.crg"
+    label = f"{surface.label}-obstacles" if obstacles else surface.label
+    path = directory / f"{track.name}-{label}-{_key(track, surface, obstacles)[:16]}.crg"
     if path.is_file():
         return path
-    v = surface.columns(track.s)
-    grid = surface.elevation(track.s, v)
+    grid = road_grid(track.s, surface, obstacles)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         unfinished = directory / f".{path.stem}-{uuid4().hex}.crg"
         try:
-            write_crg(unfinished, track, v, grid)
+            write_crg(unfinished, track, grid)
             unfinished.replace(path)
         finally:
             unfinished.unlink(missing_ok=True)
@@ -48,9 +57,10 @@ def build_road(track: Track, surface: Surface, cache_dir: Path | None = None) ->
     return path
 
 
-def _key(track: Track, surface: Surface) -> str:
+def _key(track: Track, surface: Surface, obstacles: Sequence[Obstacle]) -> str:
     digest = hashlib.sha256(f"{WRITER_VERSION} {track.name} {track.length!r}".encode())
     for line in (track.s, *track.lines()):
         digest.update(line.tobytes())
-    digest.update(surface_key(surface).encode())
+    digest.update(surface.columns(track.s).tobytes())
+    digest.update(repr((surface, *obstacles)).encode())
     return digest.hexdigest()

@@ -9,41 +9,58 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
 
-from cosim.road.track import DS, Track
+from cosim.road.grid import RoadGrid
+from cosim.road.surface import Floats
+from cosim.road.track import Track
 
-WRITER_VERSION = 1  # part of the cache's key: count up when the files change
+WRITER_VERSION = 2  # part of the cache's key: count up when the files change
 _BLOCK = 80  # binary data is filled up to whole blocks of so many bytes
 
 
-def write_crg(
-    path: Path, track: Track, v: npt.NDArray[np.float64], grid: npt.NDArray[np.float32]
-) -> None:
-    """Write a track with the elevation `grid` [m], shape (len(track.s), len(v)), at columns `v`.
+def write_crg(path: Path, track: Track, grid: RoadGrid) -> None:
+    """Write a track with the elevations of `grid`, whose cross sections are the track's own or
+    finer ones.
 
     u of the file is s of the track; x, y and z stay the track's own (an empty $ROAD_CRG_MODS keeps
     readers from moving the start to the origin). Heading and slope are those of the chords from one
     cross section to the next.
     """
-    dx, dy, dz = np.diff(track.x), np.diff(track.y), np.diff(track.z)
+    s = grid.s
+    heading, banking = _between(track, s, track.heading), _between(track, s, track.banking)
+    dx = np.diff(_along(track, s, track.x, np.cos(track.heading)))
+    dy = np.diff(_along(track, s, track.y, np.sin(track.heading)))
+    dz = np.diff(_along(track, s, track.z, track.grade))
     chord = np.arctan2(dy, dx)
-    middle = 0.5 * (track.heading[1:] + track.heading[:-1])
+    middle = 0.5 * (heading[1:] + heading[:-1])
     # the chord's direction, counted on as the track counts its heading
     phi = middle + np.remainder(chord - middle + np.pi, 2.0 * np.pi) - np.pi
-    first = [float(track.heading[0])]  # the first entries of both channels are not used
-    data = np.column_stack(
-        [np.concatenate((first, phi)), np.concatenate(([0.0], dz / DS)), track.banking, grid]
-    ).astype(">f4")
+    first = [float(heading[0])]  # the first entries of both channels are not used
+    slope = np.concatenate(([0.0], dz / grid.step))
+    channels = [np.concatenate((first, phi)), slope, banking, grid.elevation]
+    data = np.column_stack(channels).astype(">f4")
     filler = np.full(-data.size % (_BLOCK // 4), np.nan, dtype=">f4")
-    path.write_bytes(_header(track, v).encode("ascii") + data.tobytes() + filler.tobytes())
+    path.write_bytes(_header(track, grid).encode("ascii") + data.tobytes() + filler.tobytes())
 
 
-def _header(track: Track, v: npt.NDArray[np.float64]) -> str:
+def _between(track: Track, s: Floats, values: Floats) -> Floats:
+    return values if s is track.s else np.interp(s, track.s, values)
+
+
+def _along(track: Track, s: Floats, values: Floats, slopes: Floats) -> Floats:
+    """Return a coordinate of the line [m] at `s`, between the track's points by its direction."""
+    if s is track.s:
+        return values
+    return np.asarray(CubicHermiteSpline(track.s, values, slopes)(s), dtype=np.float64)
+
+
+def _header(track: Track, grid: RoadGrid) -> str:
+    v, step = grid.v, grid.step
     values = {
         "reference_line_start_u": track.s[0],
         "reference_line_end_u": track.s[-1],
-        "reference_line_increment": DS,
+        "reference_line_increment": step,
         "long_section_v_right": v[0],
         "long_section_v_left": v[-1],
         "reference_line_start_x": track.x[0],
@@ -63,7 +80,7 @@ def _header(track: Track, v: npt.NDArray[np.float64]) -> str:
         "$",
         "$KD_DEFINITION",
         "#:KRBI",
-        f"U:reference line u,m,{float(track.s[0]):.12g},{DS:.12g}",
+        f"U:reference line u,m,{float(track.s[0]):.12g},{step:.12g}",
         "D:reference line phi,rad",
         "D:reference line slope,m/m",
         "D:reference line banking,m/m",

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from cosim.scenario.model import Model
+from cosim.scenario.surface import SurfaceName
 
 
 class Limit(Model):
@@ -14,6 +15,9 @@ class Limit(Model):
     metric: str = Field(min_length=1, description="dotted path in metrics.json")
     min: float | None = Field(default=None, description="smallest value that passes")
     max: float | None = Field(default=None, description="largest value that passes")
+    surface: SurfaceName | None = Field(
+        default=None, description="only on this surface; on others the limit is left out"
+    )
 
     @model_validator(mode="after")
     def _some_bound(self) -> Limit:

@@ -85,7 +85,7 @@ def _sentence(finding: dict[str, Any], key: Key, schema: dict[str, Any]) -> str:
         return f"{name} must not be empty"
     message = str(finding["msg"])
     if message.startswith("must "):
-        return f"{name} {message}, not {_shown(value)}"
+        return f"{name} {message}, not {_shown(value)}{context.get('hint', '')}"
     return f"{name or 'the scenario'}: {message}"
 
 
@@ -102,7 +102,7 @@ def _unknown(name: str, above: str, location: Key, schema: dict[str, Any]) -> st
 
 
 def _wrong_kind(name: str, value: Any, schema: dict[str, Any]) -> str:
-    kinds = list(schema.get("discriminator", {}).get("mapping", {}))
+    kinds = list(_kinds(schema))
     if not isinstance(value, dict):
         return f"{name} must be a mapping with kind: {_one_of(kinds)}, not {_shown(value)}"
     if "kind" not in value:
@@ -115,7 +115,7 @@ def _descend(schema: dict[str, Any], location: tuple[str | int, ...]) -> dict[st
     """Return the part of the JSON Schema that pydantic's location stands for."""
     here = _resolve(schema, schema)
     for part in location:
-        mapping = here.get("discriminator", {}).get("mapping", {})
+        mapping = _kinds(here)
         if part in here.get("properties", {}):
             here = here["properties"][part]
         elif part in mapping:
@@ -126,6 +126,12 @@ def _descend(schema: dict[str, Any], location: tuple[str | int, ...]) -> dict[st
             here = here["additionalProperties"]
         here = _resolve(here, schema)
     return here
+
+
+def _kinds(here: dict[str, Any]) -> dict[str, str]:
+    """Return where each kind is described, also below a field that may be a single word instead."""
+    found = [member.get("discriminator", {}) for member in (here, *here.get("anyOf", []))]
+    return next((one["mapping"] for one in found if "mapping" in one), {})
 
 
 def _resolve(here: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:

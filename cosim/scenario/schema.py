@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field, PrivateAttr, field_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from cosim.errors import Place, Problem, did_you_mean
@@ -93,6 +93,14 @@ class Scenario(Model):
                     "labels", "two runs are called '{label}'; give one a name", {"label": label}
                 )
         return value
+
+    @model_validator(mode="after")
+    def _limits_have_a_surface(self) -> Scenario:
+        if self.road.file is not None and any(limit.surface for limit in self.limits):
+            raise PydanticCustomError(
+                "limit_surface", "a limit's surface belongs to a track; a road file has its own"
+            )
+        return self
 
     @property
     def file(self) -> Path | None:
