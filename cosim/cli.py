@@ -100,6 +100,22 @@ def dataset(recipe: Path, out: Path, workers: int) -> None:
         click.echo(f"{count} runs in {out}", err=True)
 
 
+@main.command()
+@click.argument("fmus", metavar="FMU...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print the reports as JSON on stdout.")
+@click.option("--static", is_flag=True, help="Only read the FMU; do not run it.")
+def check(fmus: tuple[Path, ...], as_json: bool, static: bool) -> None:
+    """Find the defects of co-simulation FMUs, FMI 2.0 or 3.0, in their files and while they run.
+
+    Each FMU runs in processes of its own, so that a crash or a hang becomes a finding.
+    """
+    with _failures_as_exit_codes():
+        from cosim.check.command import run as run_checks
+
+        code = run_checks(fmus, as_json, static)
+    sys.exit(code)
+
+
 @contextmanager
 def _failures_as_exit_codes() -> Iterator[None]:
     try:
