@@ -168,10 +168,10 @@ class Slave:
     def _log2(
         self, _environment: Any, _name: bytes, _status: int, _category: bytes, text: bytes
     ) -> None:
-        self.messages.append(text.decode("utf-8", "replace"))
+        self.messages.append(_plain(text))
 
     def _log3(self, _environment: Any, _status: int, _category: bytes, text: bytes) -> None:
-        self.messages.append(text.decode("utf-8", "replace"))
+        self.messages.append(_plain(text))
 
     def _bind(self) -> None:
         """Wrap the arguments of the three calls of the loop, once."""
@@ -250,6 +250,11 @@ class Slave:
         else:
             words = f"status {_STATUS[cause] if 0 <= cause < len(_STATUS) else cause}, no message"
         return FmuError(f"{self.description.path.name}: could not {what}: {words}")
+
+
+def _plain(message: bytes) -> str:
+    """A message without the standard's escape of "#", which marks a value reference."""
+    return message.decode("utf-8", "replace").replace("##", "#")
 
 
 def _first_line(error: Exception) -> str:

@@ -223,8 +223,9 @@ td,th{{text-align:left;padding:2px 12px 2px 0}}</style>
 <h1>{name} {html.escape(version)}</h1>
 <p>{html.escape(model["description"])}</p>
 <p>Recommended communication step {model["step_size"]} s; inputs are held over a step.
-Values are in the units of the table. A parameter outside its range, a value that is not finite and
-a call at the wrong time are refused with a message; a refused call changes nothing.</p>
+Values are in the units of the table. A parameter beyond its range, a value that is not finite and
+a call at the wrong time are refused with a message; a refused call changes nothing. An input beyond
+its range acts at its limit, with one warning.</p>
 <table><tr>{"".join(f"<th>{h}</th>" for h in heads)}</tr>
 {rows}
 </table></body></html>

@@ -33,6 +33,8 @@ def _comment(text: str) -> str:
 
 def header(table: Table) -> str:
     """The text of ``variables.h``."""
+    reals = table.of_type("Float64")
+    outputs = [i for i, v in enumerate(reals) if v.causality == "output"]
     lines = [
         "/* Generated from variables.toml by fmu/build.py. */",
         "#ifndef VARIABLES_H",
@@ -41,6 +43,9 @@ def header(table: Table) -> str:
         f"#define MODEL_NAME {quote(table.model['name'])}",
         f"#define MODEL_CATEGORIES {len(table.model['log_categories'])}",
         f"#define MODEL_STRING_SIZE {STRING_SIZE}",
+        f"#define MODEL_REALS {len(reals)}u /* the struct begins with them, by value reference */",
+        f"#define MODEL_OUTPUTS_BEGIN {outputs[0] if outputs else 0}u /* real outputs */",
+        f"#define MODEL_OUTPUTS_END {outputs[-1] + 1 if outputs else 0}u",
         "",
         "typedef struct {",
     ]

@@ -15,7 +15,10 @@ BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 FIRST_REFERENCE = {"Float64": 0, "Boolean": 100_000, "String": 200_000}
 TIME_REFERENCE = 999_999
 STRING_SIZE = 1024
-LAYER_CATEGORY = ("logStatusError", "A call failed; the message says why")
+LAYER_CATEGORIES = (
+    ("logStatusError", "A call failed; the message says why"),
+    ("logStatusWarning", "A call succeeded with something the user should know"),
+)
 VARIABILITIES = {
     "parameter": ("fixed", "tunable"),
     "input": ("continuous", "discrete"),
@@ -227,8 +230,8 @@ def _read_model(raw: dict[str, Any], problems: list[str]) -> dict[str, Any]:
         f"[model]: no '{key}'" for key in ("name", "identifier", "description") if key not in raw
     ]
     categories = [tuple(c) for c in raw.get("log_categories", [])]
-    if LAYER_CATEGORY[0] not in [c[0] for c in categories]:
-        categories.insert(0, LAYER_CATEGORY)
+    own = {name for name, _ in categories}
+    categories = [c for c in LAYER_CATEGORIES if c[0] not in own] + categories
     return {"step_size": 0.01, "stop_time": 10.0, **raw, "log_categories": categories}
 
 

@@ -1,5 +1,6 @@
 """One face for an instance of FMI 2.0 or FMI 3.0: each test of the ceremony runs on both."""
 
+import ctypes
 import os
 import sys
 from importlib import import_module
@@ -14,14 +15,22 @@ FIXTURE = ROOT / "tests" / "fmu_fixture"
 sys.path.insert(0, str(ROOT / "fmu"))  # fmu/ is a folder of scripts, not a package
 build, generate, variables = map(import_module, ("build", "generate", "variables"))
 
-ERROR = 3
+OK, WARNING, ERROR = 0, 1, 3
 H = 0.1
 
 
 class Face:
     """An instance, its messages, its variables by name; a refused call raises FMICallException."""
 
-    def __init__(self, folder: Path, *, token: str | None = None, logger: bool = True) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        token: str | None = None,
+        name: str = "face",
+        logger: bool = True,
+        logging: bool = True,
+    ) -> None:
         self.description = fmpy.read_model_description(str(folder))
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.version = int(self.description.fmiVersion[0])
@@ -31,20 +40,20 @@ class Face:
             guid=token or self.description.guid,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             unzipDirectory=str(folder),
-            instanceName="face",
+            instanceName=name,
         )
-        self._instantiate(logger)
+        self._instantiate(logger, logging)
 
-    def _instantiate(self, logger: bool) -> None:
+    def _instantiate(self, logger: bool, logging: bool) -> None:
         if self.version == 2:
             self.callbacks = fmi2.fmi2CallbackFunctions()
             if logger:
                 self.callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(
                     lambda _env, _name, *message: self._log(*message)
                 )
-            self.fmu.instantiate(callbacks=self.callbacks, loggingOn=True)
+            self.fmu.instantiate(callbacks=self.callbacks, loggingOn=logging)
         elif logger:
-            self.fmu.instantiate(logMessage=lambda _env, *m: self._log(*m), loggingOn=True)
+            self.fmu.instantiate(logMessage=lambda _env, *m: self._log(*m), loggingOn=logging)
         else:
             resources = os.path.join(self.fmu.unzipDirectory, "resources", "")  # noqa: PTH118
             arguments = [b"face", self.fmu.guid.encode(), resources.encode()]
@@ -88,6 +97,33 @@ class Face:
         if variable.type == "Boolean":
             return bool(value)
         return value.decode() if isinstance(value, bytes) else value
+
+    def call(self, name: str, *arguments: Any) -> int:
+        """The status of an entry point, named as in FMI 2.0, called without FMPy's own checks."""
+        if self.version == 3:
+            name = name.replace("FMUstate", "FMUState").replace("DeSerialize", "Deserialize")
+        entry = ctypes.cast(getattr(self.fmu.dll, f"fmi{self.version}{name}"), ctypes.c_void_p)
+        function = ctypes.CFUNCTYPE(ctypes.c_int)(entry.value or 0)
+        return int(function(ctypes.c_void_p(self.fmu.component), *arguments))
+
+    def refusal(self, name: str, *arguments: Any) -> str:
+        """The message of an entry point that must answer Error."""
+        before = len(self.messages)
+        assert self.call(name, *arguments) == ERROR
+        status, category, message = self.messages[before]
+        assert (status, category, len(self.messages)) == (ERROR, "logStatusError", before + 1)
+        return message
+
+    def sized(self, references: Any, n: int, values: Any) -> tuple[Any, ...]:
+        """Arguments of a getter or setter; FMI 3.0 repeats the number of values."""
+        size = ctypes.c_size_t(n)
+        return (references, size, values, *([size] if self.version == 3 else []))
+
+    def set_status(self, name: str, value: float) -> int:
+        """Set a real variable; returns the status."""
+        reference = (ctypes.c_uint * 1)(self.variables[name].valueReference)
+        setter = "SetReal" if self.version == 2 else "SetFloat64"
+        return self.call(setter, *self.sized(reference, 1, (ctypes.c_double * 1)(value)))
 
     def step(self, k: int, h: float = H) -> None:
         """The step from k * h to (k + 1) * h."""

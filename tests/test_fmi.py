@@ -246,10 +246,12 @@ def test_start_values_that_the_fmu_refuses(version: int) -> None:
     slave.close()
 
 
-def test_words_of_the_initialisation(tmp_path: Path) -> None:
-    slave = Slave(Description(builtin_fmu()), [], ["Car.ax"])
-    with pytest.raises(FmuError, match=r"could not initialise: .*gone\.crg"):
-        slave.initialise({"Road.File": str(tmp_path / "gone.crg")})
+@pytest.mark.parametrize("version", [2, 3])
+def test_words_of_the_initialisation(tmp_path: Path, version: int) -> None:
+    """In plain text: the standard has "#" doubled in a message."""
+    slave = Slave(Description(builtin_fmu(version)), [], ["Car.ax"])
+    with pytest.raises(FmuError, match=r"could not initialise: .*/rig #1/gone\.crg"):
+        slave.initialise({"Road.File": str(tmp_path / "rig #1" / "gone.crg")})
     slave.close()
 
 

@@ -1,6 +1,7 @@
 """The FMI ceremony (fmu/common), on a small model, in both FMI versions."""
 
 import contextlib
+import ctypes
 import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -10,7 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmu_face import ERROR, FIXTURE, Face, H, build
+from fmu_face import ERROR, FIXTURE, OK, WARNING, Face, H, build
 
 Make = Callable[..., Face]
 
@@ -172,13 +173,32 @@ def test_a_refused_call_sets_none_of_its_values(make: Make) -> None:
     assert face["Lag.Start"] == 0.0
 
 
-def test_inputs_may_leave_their_range(make: Make) -> None:
-    face = make().initialise()
-    face["In.u"] = 11.0
-    before = face["Out.FL"]
-    face.step(0)
-    assert face["In.u"] == 11.0
-    assert face["Out.FL"] > before  # on its way to 11 rad
+def test_an_input_beyond_its_range_acts_at_its_limit(make: Make) -> None:
+    """docs/decisions/0008: one warning, then the limit in silence; a parameter is refused."""
+    limit, beyond, low = make().initialise(), make().initialise(), make().initialise()
+    limit["In.u"], beyond["In.u"], low["In.u"] = 10.0, 11.0, -1e300
+    for k in range(5):
+        assert beyond.set_status("In.u", 11.0 + k) == OK  # it has been said
+        for face in (limit, beyond, low):
+            face.step(k)
+    assert beyond.run(5, 8) == limit.run(5, 8)
+    assert (beyond["In.u"], low["In.u"]) == (limit["In.u"], -10.0)
+    setter = "fmi2SetReal" if beyond.version == 2 else "fmi3SetFloat64"
+    assert beyond.messages == [
+        (
+            WARNING,
+            "logStatusWarning",
+            f"{setter}: In.u = 11 rad is beyond its range of -10 to 10 rad and acts as 10 rad;"
+            " this is said once.",
+        )
+    ]
+
+
+def test_the_warning_of_an_input_comes_again_after_reset(make: Make) -> None:
+    face = make()
+    assert [face.set_status("In.u", 11.0) for _ in range(3)] == [WARNING, OK, OK]
+    face.fmu.reset()
+    assert [face.set_status("In.u", -11.0) for _ in range(2)] == [WARNING, OK]
 
 
 def test_unknown_references_and_types_are_refused(make: Make) -> None:
@@ -231,8 +251,8 @@ def test_resources_path_with_spaces_and_letters(make: Make, folder: Path) -> Non
 
 def test_messages_are_formatted_for_their_fmi_version(make: Make) -> None:
     face = make().initialise(Gain_File="gain.txt")
-    signs = ("%%", "##") if face.version == 2 else ("%", "#")  # FMI 2 messages are printf formats
-    assert face.last == "The gain is 2.5 (100 {} of {}1).".format(*signs)
+    percent = "%%" if face.version == 2 else "%"  # FMI 2 messages are printf formats
+    assert face.last == f"The gain is 2.5 (100 {percent} of ##1)."  # "#1#" would be a variable
     assert face.messages[-1][:2] == (0, "logGain")
 
 
@@ -248,6 +268,56 @@ def test_log_categories(make: Make) -> None:
     refused(face, lambda: face.step(7))  # errors always speak
 
 
+def test_one_category_is_switched_off(make: Make) -> None:
+    """FMI 3 switches the given categories; in FMI 2 off means all of them."""
+    face = make()
+    face.fmu.setDebugLogging(False, ["logStatusWarning"])
+    face.set_status("In.u", 11.0)
+    assert face.messages == []
+    face.initialise(Gain_File="gain.txt")
+    assert [m[1] for m in face.messages] == ([] if face.version == 2 else ["logGain"])
+
+
+def test_without_logging_only_errors_speak(make: Make) -> None:
+    face = make(logging=False)
+    assert face.set_status("In.u", 11.0) == WARNING
+    face.initialise(Gain_File="gain.txt")
+    assert face.messages == []
+    assert "stands at 0 s" in refused(face, lambda: face.step(7))
+    face.messages.clear()
+    face.fmu.setDebugLogging(True, [])
+    face.fmu.reset()
+    face.initialise(Gain_File="gain.txt")
+    assert [m[1] for m in face.messages] == ["logGain"]
+
+
+def test_an_instance_needs_a_name(make: Make) -> None:
+    for name in ("", " \t\n"):
+        with pytest.raises(Exception, match="instantiate"):
+            make(name=name)
+
+
+def test_null_pointers_are_refused(make: Make) -> None:
+    """Where the standard gives them no meaning; with nothing to read or write they are fine."""
+    face = make().initialise()
+    kind = {2: "Real", 3: "Float64"}[face.version]
+    value = (ctypes.c_double * 1)(0.5)
+    for of_type, name in ((kind, "In.u"), ("Boolean", "In.Hold"), ("String", "Gain.File")):
+        reference = (ctypes.c_uint * 1)(face.variables[name].valueReference)
+        for call in (f"Get{of_type}", f"Set{of_type}"):
+            assert "null pointer" in face.refusal(call, *face.sized(reference, 1, None))
+            assert "null pointer" in face.refusal(call, *face.sized(None, 1, value))
+            assert face.call(call, *face.sized(None, 0, None)) == OK
+    for call in ("GetFMUstate", "DeSerializeFMUstate"):
+        bytes_and_size = (b"x", ctypes.c_size_t(1)) if call.startswith("De") else ()
+        face.refusal(call, *bytes_and_size, None)
+    for call in ("SetFMUstate", "SerializedFMUstateSize"):
+        face.refusal(call, *(None,) * (2 if "Size" in call else 1))
+    assert face.call("FreeFMUstate", None) == OK
+    face.refusal("SetDebugLogging", 1, ctypes.c_size_t(1), None)
+    face.step(0)
+
+
 def test_no_logger(make: Make) -> None:
     face = make(logger=False)
     with pytest.raises(FMICallException):
@@ -257,7 +327,7 @@ def test_no_logger(make: Make) -> None:
 
 
 def test_an_output_that_is_not_finite_is_an_error(make: Make) -> None:
-    face = make().initialise(In_u=10.0)
+    face = make().initialise(In_u=-7.5)
     assert "the output Out.FR became nan" in refused(face, lambda: face.step(0))
     assert "after an error" in refused(face, lambda: face.step(0))
 
@@ -306,6 +376,21 @@ def test_foreign_bytes_are_refused(make: Make) -> None:
     data = face.serialize()
     assert "not a serialised state" in refused(face, lambda: face.restore(data[:-1]))
     assert "not a serialised state" in refused(face, lambda: face.restore(b"?" + data[1:]))
+    for place in (64, 80, len(data) // 2, len(data) - 1):
+        damaged = bytearray(data)
+        damaged[place] ^= 1
+        message = refused(face, lambda damaged=damaged: face.restore(bytes(damaged)))
+        assert "are a damaged state of Lag" in message
+
+
+def test_memory_that_is_no_state_is_left_alone(make: Make) -> None:
+    face = make()
+    foreign = ctypes.create_string_buffer(b"?" * 64)
+    handle = ctypes.c_void_p(ctypes.addressof(foreign))
+    for call in ("GetFMUstate", "FreeFMUstate"):
+        assert "not a state of Lag" in face.refusal(call, ctypes.byref(handle))
+    assert "not a state of Lag" in face.refusal("SetFMUstate", handle)
+    assert foreign.raw[:64] == b"?" * 64
 
 
 def test_reset_equals_a_fresh_instance(make: Make) -> None:

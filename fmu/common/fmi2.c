@@ -9,31 +9,15 @@
 #define ENTRY(expression)                                                                                              \
     do {                                                                                                               \
         Instance *i = c;                                                                                               \
-        return i ? to_fmi(expression) : fmi2Error;                                                                     \
+        return i ? (fmi2Status)(expression) : fmi2Error;                                                               \
     } while (0)
-#define NOT_HERE(reason) ENTRY(refuse(i, "%s is not available: " reason, __func__))
-#define NO_MODEL_EXCHANGE NOT_HERE("this FMU is for co-simulation only.")
 
-static fmi2Status to_fmi(ModelStatus status)
-{
-    return status == MODEL_OK ? fmi2OK : status == MODEL_WARNING ? fmi2Warning : fmi2Error;
-}
+const char message_escapes[] = "%#"; /* FMI 2 reads a message as a printf format with #r1# for variable references */
 
-/* FMI 2 reads the message as a printf format with #r1# for variable references: both signs are doubled. */
 void deliver(const Instance *instance, ModelStatus status, const char *category, const char *message)
 {
     fmi2CallbackLogger logger = (fmi2CallbackLogger)instance->logger;
-    char escaped[4096];
-    size_t n = 0;
-    if (!logger)
-        return;
-    for (; *message && n < sizeof escaped - 2; message++) {
-        if (*message == '%' || *message == '#')
-            escaped[n++] = *message;
-        escaped[n++] = *message;
-    }
-    escaped[n] = '\0';
-    logger(instance->environment, instance->name, to_fmi(status), category, escaped);
+    logger(instance->environment, instance->name, (fmi2Status)status, category, message);
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -95,9 +79,10 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 
 void fmi2FreeInstance(fmi2Component c) { instance_free(c); }
 
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[])
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
+                               const fmi2String categories[])
 {
-    ENTRY(set_logging(i, __func__, loggingOn, nCategories, categories));
+    ENTRY(set_logging(i, __func__, loggingOn, loggingOn ? nCategories : 0, categories)); /* off means all off */
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
@@ -117,62 +102,44 @@ static ModelStatus enter_initialization(Instance *i, const char *function)
     return MODEL_OK;
 }
 
-static ModelStatus terminate(Instance *i, const char *function)
-{
-    if (check_phase(i, function, STEPPING | FAILED))
-        return MODEL_ERROR;
-    i->progress.phase = TERMINATED;
-    return MODEL_OK;
-}
-
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { ENTRY(enter_initialization(i, __func__)); }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { ENTRY(exit_initialization(i, __func__)); }
 fmi2Status fmi2Terminate(fmi2Component c) { ENTRY(terminate(i, __func__)); }
-fmi2Status fmi2Reset(fmi2Component c) { ENTRY(reset(i, __func__)); }
+fmi2Status fmi2Reset(fmi2Component c) { ENTRY(reset(i)); }
 
 /* --- variables ----------------------------------------------------------------------------------------------- */
 
+#define REFERENCES const fmi2ValueReference vr[], size_t nvr
+
+fmi2Status fmi2GetReal(fmi2Component c, REFERENCES, fmi2Real value[]) { ENTRY(get_reals(i, __func__, vr, nvr, value)); }
+
+fmi2Status fmi2SetReal(fmi2Component c, REFERENCES, const fmi2Real value[])
+{
+    ENTRY(set_reals(i, __func__, vr, nvr, value));
+}
+
 #define GETTER(Name, kind, expression)                                                                                 \
-    fmi2Status fmi2Get##Name(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##Name value[])           \
+    fmi2Status fmi2Get##Name(fmi2Component c, REFERENCES, fmi2##Name value[])                                          \
     {                                                                                                                  \
-        ModelStatus status = c ? check_get(c, __func__, kind, vr, nvr) : MODEL_ERROR;                                  \
+        ModelStatus status = c ? check_get(c, __func__, kind, vr, nvr, value) : MODEL_ERROR;                           \
         for (size_t k = 0; k < nvr && status != MODEL_ERROR; k++)                                                      \
             value[k] = expression;                                                                                     \
-        return to_fmi(status);                                                                                         \
+        return (fmi2Status)status;                                                                                     \
     }
 
 #define SETTER(Name, kind, statement)                                                                                  \
-    fmi2Status fmi2Set##Name(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##Name value[])     \
+    fmi2Status fmi2Set##Name(fmi2Component c, REFERENCES, const fmi2##Name value[])                                    \
     {                                                                                                                  \
         ModelStatus status = c ? check_set(c, __func__, kind, vr, nvr, value) : MODEL_ERROR;                           \
         for (size_t k = 0; k < nvr && status != MODEL_ERROR; k++)                                                      \
             statement;                                                                                                 \
-        return to_fmi(status);                                                                                         \
+        return (fmi2Status)status;                                                                                     \
     }
 
-GETTER(Real, KIND_REAL, *(double *)value_of(c, KIND_REAL, vr[k]))
 GETTER(Boolean, KIND_BOOLEAN, *(int *)value_of(c, KIND_BOOLEAN, vr[k]) ? fmi2True : fmi2False)
 GETTER(String, KIND_STRING, value_of(c, KIND_STRING, vr[k]))
-SETTER(Real, KIND_REAL, *(double *)value_of(c, KIND_REAL, vr[k]) = value[k])
 SETTER(Boolean, KIND_BOOLEAN, *(int *)value_of(c, KIND_BOOLEAN, vr[k]) = value[k] != fmi2False)
 SETTER(String, KIND_STRING, set_string(c, vr[k], value[k]))
-
-static ModelStatus no_integers(Instance *i, const char *function, size_t n)
-{
-    return n ? refuse(i, "%s: " MODEL_NAME " has no integer variables.", function) : MODEL_OK;
-}
-
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
-{
-    (void)vr, (void)value;
-    ENTRY(no_integers(i, __func__, nvr));
-}
-
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
-{
-    (void)vr, (void)value;
-    ENTRY(no_integers(i, __func__, nvr));
-}
 
 /* --- saved states -------------------------------------------------------------------------------------------- */
 
@@ -204,90 +171,62 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     ENTRY(do_step(i, __func__, currentCommunicationPoint, communicationStepSize));
 }
 
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
+#define STATUS(Name, fmi2Type, kind, expression)                                                                       \
+    fmi2Status fmi2Get##Name##Status(fmi2Component c, const fmi2StatusKind s, fmi2Type *value)                         \
+    {                                                                                                                  \
+        const Instance *i = c;                                                                                         \
+        if (i && s == kind && value)                                                                                   \
+            return *value = expression, fmi2OK;                                                                        \
+        return i ? fmi2Discard : fmi2Error;                                                                            \
+    }
+
+STATUS(Real, fmi2Real, fmi2LastSuccessfulTime, i->progress.time)
+STATUS(Boolean, fmi2Boolean, fmi2Terminated, fmi2False) /* the model never asks for an end */
+STATUS(, fmi2Status, fmi2DoStepStatus, i->progress.phase == FAILED ? fmi2Error : fmi2OK)
+STATUS(String, fmi2String, fmi2PendingStatus, "") /* steps are synchronous: nothing is ever pending */
+
+/* --- what the capability flags say is absent: no argument is looked at -------------------------------------------- */
+
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
+#define ABSENT(name, arguments, reason)                                                                                \
+    fmi2Status name arguments { ENTRY(refuse(i, "%s is not available: " reason, __func__)); }
+
+static ModelStatus no_integers(const Instance *i, const char *function, size_t n)
 {
-    if (!c || s != fmi2LastSuccessfulTime)
-        return c ? fmi2Discard : fmi2Error;
-    *value = ((Instance *)c)->progress.time;
-    return fmi2OK;
+    return n ? refuse(i, "%s: " MODEL_NAME " has no integer variables.", function) : MODEL_OK;
 }
 
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
+fmi2Status fmi2GetInteger(fmi2Component c, REFERENCES, fmi2Integer value[]) { ENTRY(no_integers(i, __func__, nvr)); }
+fmi2Status fmi2SetInteger(fmi2Component c, REFERENCES, const fmi2Integer value[])
 {
-    if (!c || s != fmi2Terminated)
-        return c ? fmi2Discard : fmi2Error;
-    *value = fmi2False; /* the model never asks for an end */
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
-{
-    if (!c || s != fmi2DoStepStatus)
-        return c ? fmi2Discard : fmi2Error;
-    *value = ((Instance *)c)->progress.phase == FAILED ? fmi2Error : fmi2OK;
-    return fmi2OK;
+    ENTRY(no_integers(i, __func__, nvr));
 }
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value)
 {
-    (void)s, (void)value;
     return c ? fmi2Discard : fmi2Error;
 }
 
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value)
-{
-    (void)s, (void)value;
-    return c ? fmi2Discard : fmi2Error;
-}
+ABSENT(fmi2CancelStep, (fmi2Component c), "steps are synchronous.")
+ABSENT(fmi2SetRealInputDerivatives, (fmi2Component c, REFERENCES, const fmi2Integer order[], const fmi2Real value[]),
+       "inputs are held over a step.")
+ABSENT(fmi2GetRealOutputDerivatives, (fmi2Component c, REFERENCES, const fmi2Integer order[], fmi2Real value[]),
+       "maxOutputDerivativeOrder is 0.")
+ABSENT(fmi2GetDirectionalDerivative,
+       (fmi2Component c, const fmi2ValueReference vUnknown[], size_t nUnknown, const fmi2ValueReference vKnown[],
+        size_t nKnown, const fmi2Real dvKnown[], fmi2Real dvUnknown[]),
+       "providesDirectionalDerivative is false.")
 
-fmi2Status fmi2CancelStep(fmi2Component c) { NOT_HERE("steps are synchronous."); }
-
-/* --- what the capability flags say is absent ------------------------------------------------------------------- */
-
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                       const fmi2Integer order[], const fmi2Real value[])
-{
-    (void)vr, (void)nvr, (void)order, (void)value;
-    NOT_HERE("inputs are held over a step.");
-}
-
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                        const fmi2Integer order[], fmi2Real value[])
-{
-    (void)vr, (void)nvr, (void)order, (void)value;
-    NOT_HERE("maxOutputDerivativeOrder is 0.");
-}
-
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
-                                        const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
-                                        fmi2Real dvUnknown[])
-{
-    (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
-    NOT_HERE("providesDirectionalDerivative is false.");
-}
-
-fmi2Status fmi2EnterEventMode(fmi2Component c) { NO_MODEL_EXCHANGE; }
-fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) { (void)info; NO_MODEL_EXCHANGE; }
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { NO_MODEL_EXCHANGE; }
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) { (void)time; NO_MODEL_EXCHANGE; }
-
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
-{
-    (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
-    NO_MODEL_EXCHANGE;
-}
-
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)
-{
-    (void)x, (void)nx;
-    NO_MODEL_EXCHANGE;
-}
-
-#define NO_VECTOR(name)                                                                                                \
-    fmi2Status name(fmi2Component c, fmi2Real x[], size_t nx) { (void)x, (void)nx; NO_MODEL_EXCHANGE; }
-
-NO_VECTOR(fmi2GetDerivatives)
-NO_VECTOR(fmi2GetEventIndicators)
-NO_VECTOR(fmi2GetContinuousStates)
-NO_VECTOR(fmi2GetNominalsOfContinuousStates)
+ABSENT(fmi2EnterEventMode, (fmi2Component c), ONLY_CO_SIMULATION)
+ABSENT(fmi2NewDiscreteStates, (fmi2Component c, fmi2EventInfo *info), ONLY_CO_SIMULATION)
+ABSENT(fmi2EnterContinuousTimeMode, (fmi2Component c), ONLY_CO_SIMULATION)
+ABSENT(fmi2CompletedIntegratorStep,
+       (fmi2Component c, fmi2Boolean noSetPrior, fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation),
+       ONLY_CO_SIMULATION)
+ABSENT(fmi2SetTime, (fmi2Component c, fmi2Real time), ONLY_CO_SIMULATION)
+ABSENT(fmi2SetContinuousStates, (fmi2Component c, const fmi2Real x[], size_t nx), ONLY_CO_SIMULATION)
+ABSENT(fmi2GetDerivatives, (fmi2Component c, fmi2Real derivatives[], size_t nx), ONLY_CO_SIMULATION)
+ABSENT(fmi2GetEventIndicators, (fmi2Component c, fmi2Real indicators[], size_t ni), ONLY_CO_SIMULATION)
+ABSENT(fmi2GetContinuousStates, (fmi2Component c, fmi2Real x[], size_t nx), ONLY_CO_SIMULATION)
+ABSENT(fmi2GetNominalsOfContinuousStates, (fmi2Component c, fmi2Real nominals[], size_t nx), ONLY_CO_SIMULATION)

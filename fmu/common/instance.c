@@ -26,6 +26,7 @@ static void start_over(Instance *instance)
     memcpy(&instance->model.v, &model_start, sizeof model_start);
     memset(instance->model.state, 0, model_state_size);
     memset(&instance->progress, 0, sizeof instance->progress);
+    memset(instance->limited, 0, sizeof instance->limited);
     instance->progress.phase = INSTANTIATED;
     instance->progress.outdated = true;
     instance->is_prepared = false; /* a file it was built from may have changed */
@@ -47,9 +48,8 @@ Instance *instance_new(const char *name, const char *resources, void (*logger)(v
     instance->model.host = instance;
     instance->logger = logger;
     instance->environment = environment;
-    instance->logging = logging;
     for (size_t i = 0; i < MODEL_CATEGORIES; i++)
-        instance->category_enabled[i] = true;
+        instance->category_enabled[i] = logging;
     start_over(instance);
     return instance;
 }
@@ -76,17 +76,28 @@ static int category_index(const char *category)
     return -1;
 }
 
-/* Errors and warnings always arrive, since a status without its sentence helps nobody; the rest is debug logging. */
+static void escape(char *to, size_t room, const char *from)
+{
+    for (; *from && room > 2; from++) {
+        if (strchr(message_escapes, *from))
+            *to++ = *from, room--;
+        *to++ = *from, room--;
+    }
+    *to = '\0';
+}
+
+/* Errors always arrive, as FMI 3.0.3 recommends; everything else only if its category is switched on. */
 static void say(const Instance *instance, ModelStatus status, const char *category, const char *format, va_list values)
 {
     int index = category_index(category);
     if (index < 0) /* only declared categories leave the FMU */
         index = category_index(ERROR_CATEGORY);
-    if (status == MODEL_OK && !(instance->logging && instance->category_enabled[index]))
+    if (!instance->logger || (status != MODEL_ERROR && !instance->category_enabled[index]))
         return;
-    char message[2048];
+    char message[2048], escaped[2 * sizeof message];
     vsnprintf(message, sizeof message, format, values);
-    deliver(instance, status, model_categories[index], message);
+    escape(escaped, sizeof escaped, message);
+    deliver(instance, status, model_categories[index], escaped);
 }
 
 void model_log(const Model *m, ModelStatus status, const char *category, const char *format, ...)
@@ -106,17 +117,26 @@ ModelStatus refuse(const Instance *instance, const char *format, ...)
     return MODEL_ERROR;
 }
 
+ModelStatus warn(const Instance *instance, const char *format, ...)
+{
+    va_list values;
+    va_start(values, format);
+    say(instance, MODEL_WARNING, WARNING_CATEGORY, format, values);
+    va_end(values);
+    return MODEL_WARNING;
+}
+
+/* On: the categories given and no others; off: the categories given. No categories given means all of them. */
 ModelStatus set_logging(Instance *instance, const char *function, bool on, size_t n, const char *const categories[])
 {
     for (size_t i = 0; i < n; i++)
-        if (category_index(categories[i]) < 0)
+        if (!categories || category_index(categories[i]) < 0)
             return refuse(instance, "%s: \"%s\" is not a log category of " MODEL_NAME ".", function,
-                          categories[i] ? categories[i] : "(null)");
-    for (int i = 0; i < MODEL_CATEGORIES; i++)
-        instance->category_enabled[i] = n == 0;
+                          categories && categories[i] ? categories[i] : "(null)");
+    for (int i = 0; i < MODEL_CATEGORIES && (on || n == 0); i++)
+        instance->category_enabled[i] = on && n == 0;
     for (size_t i = 0; i < n; i++)
-        instance->category_enabled[category_index(categories[i])] = true;
-    instance->logging = on;
+        instance->category_enabled[category_index(categories[i])] = on;
     return MODEL_OK;
 }
 
@@ -124,11 +144,12 @@ ModelStatus set_logging(Instance *instance, const char *function, bool on, size_
 
 ModelStatus check_identity(const Instance *instance, const char *name, const char *token)
 {
-    if (!name || !*name)
+    if (!name || !name[strspn(name, " \t\r\n")])
         return refuse(instance, MODEL_NAME " cannot be instantiated without an instance name.");
     if (!token || strcmp(token, model_token) != 0)
-        return refuse(instance, MODEL_NAME " cannot be instantiated: the token \"%s\" is not that of this binary, \"%s\"; "
-                      "modelDescription.xml and binary come from different builds.", token ? token : "(null)", model_token);
+        return refuse(instance, MODEL_NAME " cannot be instantiated: the token \"%s\" is not that of this binary, "
+                      "\"%s\"; modelDescription.xml and binary come from different builds.", token ? token : "(null)",
+                      model_token);
     return MODEL_OK;
 }
 
@@ -191,11 +212,11 @@ ModelStatus do_step(Instance *instance, const char *function, double t, double h
     /* a master may count n*h or add up h: both are met if the slack is far above rounding and far below a step */
     double slack = 1e-6 * h + 1e-12 * fabs(t);
     if (!(fabs(t - progress->time) <= slack))
-        return refuse(instance, "%s: the communication point is %.17g s, but the instance stands at %.17g s.", function, t,
-                      progress->time);
+        return refuse(instance, "%s: the communication point is %.17g s, but the instance stands at %.17g s.", function,
+                      t, progress->time);
     if (progress->stop_defined && t + h > progress->stop_time + slack)
-        return refuse(instance, "%s: a step from %.17g s to %.17g s would pass the stop time %.17g s.", function, t, t + h,
-                      progress->stop_time);
+        return refuse(instance, "%s: a step from %.17g s to %.17g s would pass the stop time %.17g s.", function, t,
+                      t + h, progress->stop_time);
     ModelStatus status = model_step(&instance->model, t, h);
     if (status == MODEL_ERROR || check_outputs(instance, function)) {
         progress->phase = FAILED;
@@ -205,10 +226,16 @@ ModelStatus do_step(Instance *instance, const char *function, double t, double h
     return status;
 }
 
-ModelStatus reset(Instance *instance, const char *function)
+ModelStatus terminate(Instance *instance, const char *function)
 {
-    if (check_phase(instance, function, ANY_PHASE))
+    if (check_phase(instance, function, STEPPING | FAILED))
         return MODEL_ERROR;
+    instance->progress.phase = TERMINATED;
+    return MODEL_OK;
+}
+
+ModelStatus reset(Instance *instance)
+{
     start_over(instance);
     return MODEL_OK;
 }

@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include "variables.h" /* generated: typedef struct {...} Variables; counts; start values */
 
-typedef enum { MODEL_OK, MODEL_WARNING, MODEL_ERROR } ModelStatus;
+typedef enum { MODEL_OK, MODEL_WARNING, MODEL_ERROR = 3 } ModelStatus; /* the numbers of both FMI versions */
 
 typedef struct Model {
     Variables v;          /* parameters, inputs and outputs, by the names of variables.toml */

@@ -1,11 +1,13 @@
 /* Saved states: what an instance is, as one run of plain bytes. */
 #include "instance.h"
 
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct {
     char token[64]; /* whose bytes these are */
+    uint64_t checksum; /* of all that follows, in serialised bytes; 0 in memory */
     Progress progress;
     Variables v;
     unsigned char state[]; /* model_state_size bytes */
@@ -16,14 +18,38 @@ static size_t saved_size(void)
     return sizeof(Saved) + model_state_size;
 }
 
-static bool is_ours(const Saved *saved)
+/* FNV-1a: a file that was cut, edited or filled with something else does not pass. */
+static uint64_t checksum(const unsigned char *bytes, size_t size)
 {
-    return strncmp(saved->token, model_token, sizeof saved->token) == 0;
+    uint64_t hash = 14695981039346656037u;
+    for (size_t i = 0; i < size; i++)
+        hash = (hash ^ bytes[i]) * 1099511628211u;
+    return hash;
 }
 
-/* calloc, so that padding is the same bytes each time */
-static Saved *allocate(const Instance *instance, const char *function)
+static uint64_t checksum_of(const unsigned char *saved)
 {
+    const size_t begin = offsetof(Saved, progress);
+    return checksum(saved + begin, saved_size() - begin);
+}
+
+static ModelStatus check_ours(const Instance *instance, const char *function, const void *state)
+{
+    if (!state || strncmp(state, model_token, sizeof((Saved *)0)->token) != 0)
+        return refuse(instance, "%s: this is not a state of " MODEL_NAME ".", function);
+    return MODEL_OK;
+}
+
+/* Memory for a state: the given one, which must be ours, or if that is NULL new. calloc, so that padding is the same
+ * bytes each time. */
+static Saved *room(const Instance *instance, const char *function, void **state)
+{
+    if (!state) {
+        refuse(instance, "%s: the pointer for the state is null.", function);
+        return NULL;
+    }
+    if (*state)
+        return check_ours(instance, function, *state) ? NULL : *state;
     Saved *saved = calloc(1, saved_size());
     if (!saved)
         refuse(instance, "%s: no memory for a state of %zu bytes.", function, saved_size());
@@ -32,9 +58,7 @@ static Saved *allocate(const Instance *instance, const char *function)
 
 ModelStatus state_get(Instance *instance, const char *function, void **state)
 {
-    if (!state)
-        return refuse(instance, "%s: the pointer for the state is null.", function);
-    Saved *saved = *state ? *state : allocate(instance, function);
+    Saved *saved = room(instance, function, state);
     if (!saved)
         return MODEL_ERROR;
     strncpy(saved->token, model_token, sizeof saved->token - 1);
@@ -55,8 +79,8 @@ static void restore(Instance *instance, const Saved *saved)
 ModelStatus state_set(Instance *instance, const char *function, const void *state)
 {
     const Saved *saved = state;
-    if (!saved || !is_ours(saved))
-        return refuse(instance, "%s: this is not a state of " MODEL_NAME ".", function);
+    if (check_ours(instance, function, state))
+        return MODEL_ERROR;
     restore(instance, saved);
     if (saved->progress.outdated) /* not initialised yet: derived data will be built when it is */
         return MODEL_OK;
@@ -69,8 +93,10 @@ ModelStatus state_set(Instance *instance, const char *function, const void *stat
 
 ModelStatus state_free(Instance *instance, const char *function, void **state)
 {
-    if (!state)
-        return refuse(instance, "%s: the pointer to the state is null.", function);
+    if (!state || !*state) /* as the standard has it for NULL: nothing happens */
+        return MODEL_OK;
+    if (check_ours(instance, function, *state))
+        return MODEL_ERROR;
     free(*state);
     *state = NULL;
     return MODEL_OK;
@@ -78,33 +104,41 @@ ModelStatus state_free(Instance *instance, const char *function, void **state)
 
 ModelStatus state_size(Instance *instance, const char *function, const void *state, size_t *size)
 {
-    if (!state || !is_ours(state))
-        return refuse(instance, "%s: this is not a state of " MODEL_NAME ".", function);
+    if (check_ours(instance, function, state))
+        return MODEL_ERROR;
+    if (!size)
+        return refuse(instance, "%s: the pointer for the size is null.", function);
     *size = saved_size();
     return MODEL_OK;
 }
 
 ModelStatus state_serialize(Instance *instance, const char *function, const void *state, void *bytes, size_t size)
 {
-    if (!state || !is_ours(state))
-        return refuse(instance, "%s: this is not a state of " MODEL_NAME ".", function);
+    if (check_ours(instance, function, state))
+        return MODEL_ERROR;
     if (!bytes || size < saved_size())
-        return refuse(instance, "%s: the buffer has %zu bytes, a state needs %zu.", function, size, saved_size());
+        return refuse(instance, "%s: the buffer has %zu bytes, a state needs %zu.", function, bytes ? size : 0,
+                      saved_size());
+    const uint64_t sum = checksum_of(state);
     memcpy(bytes, state, saved_size());
+    memcpy((char *)bytes + offsetof(Saved, checksum), &sum, sizeof sum);
     return MODEL_OK;
 }
 
 ModelStatus state_deserialize(Instance *instance, const char *function, const void *bytes, size_t size, void **state)
 {
-    if (!bytes || !state)
-        return refuse(instance, "%s: a pointer is null.", function);
-    if (size != saved_size() || strncmp(bytes, model_token, sizeof((Saved *)0)->token) != 0)
-        return refuse(instance, "%s: these %zu bytes are not a serialised state of this build of " MODEL_NAME ".", function,
-                      size);
-    Saved *saved = *state ? *state : allocate(instance, function);
+    uint64_t sum;
+    if (!bytes || size != saved_size() || strncmp(bytes, model_token, sizeof((Saved *)0)->token) != 0)
+        return refuse(instance, "%s: these %zu bytes are not a serialised state of this build of " MODEL_NAME ".",
+                      function, bytes ? size : 0);
+    memcpy(&sum, (const char *)bytes + offsetof(Saved, checksum), sizeof sum);
+    if (sum != checksum_of(bytes))
+        return refuse(instance, "%s: these %zu bytes are a damaged state of " MODEL_NAME ".", function, size);
+    Saved *saved = room(instance, function, state);
     if (!saved)
         return MODEL_ERROR;
     memcpy(saved, bytes, size);
+    saved->checksum = 0;
     *state = saved;
     return MODEL_OK;
 }

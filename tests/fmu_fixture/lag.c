@@ -68,7 +68,7 @@ ModelStatus model_step(Model *m, double t, double h)
     for (int i = 0; i < 4 && !m->v.In_Hold; i++)
         s->x[i] = target + (s->x[i] - target) * exp(-h / m->v.Lag_Time[i]);
     outputs(m);
-    if (m->v.In_u == 10.0) /* a way to fail */
+    if (m->v.In_u == -7.5) /* a way to fail */
         m->v.Out[1] = NAN;
     return MODEL_OK;
 }
