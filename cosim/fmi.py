@@ -134,7 +134,41 @@ class Slave:
                 f"{self.description.path.name}: ended the simulation at t = {k * h + h:.6g} s"
             )
 
+    def save(self) -> bytes:
+        """Return the serialised FMU state; `FmuError` if the FMU cannot save it."""
+        self.messages.clear()
+        names = ("getFMUstate", "serializeFMUstate", "freeFMUstate")
+        get, serialise, free = (self._state_function(name) for name in names)
+        try:
+            state = get()
+            try:
+                return bytes(serialise(state))
+            finally:
+                free(state)
+        except Exception as error:
+            raise self._failure("save its state", error) from None
+
+    def restore(self, saved: bytes) -> None:
+        """Go back to a state of `save`, of this instance or another one of the same FMU."""
+        self.messages.clear()
+        names = ("deSerializeFMUstate", "setFMUstate", "freeFMUstate")
+        read, put, free = (self._state_function(name) for name in names)
+        try:
+            state = read(saved)
+            try:
+                put(state)
+            finally:
+                free(state)
+        except Exception as error:
+            raise self._failure("restore its state", error) from None
+
     # ------------------------------------------------------------ below: FMI ceremony
+
+    def _state_function(self, name: str) -> Any:
+        """Return FMPy's wrapper of a state function, which FMI 3 spells with capitals."""
+        if self.description.major == 3:
+            name = name.replace("FMUstate", "FMUState").replace("deSerialize", "deserialize")
+        return getattr(self._fmu, name)
 
     def _load(self) -> Any:
         from fmpy.fmi2 import FMU2Slave

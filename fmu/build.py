@@ -24,6 +24,7 @@ from pathlib import Path
 
 import describe
 import generate
+import states
 from variables import Table, TableError, read_table
 
 FMU_DIRECTORY = Path(__file__).resolve().parent
@@ -197,6 +198,10 @@ def fmu_contents(model: Path, fmi: int, binary: bytes, target: str) -> dict[str,
     files["documentation/index.html"] = describe.documentation(table, version)
     for folder in ("resources", "extra"):
         files |= folder_files(model / folder, folder)
+    header = model / f"{table.model['identifier']}.h"
+    layout = states.state_table(header.read_text(encoding="utf-8")) if header.is_file() else None
+    if layout:
+        files[states.STATE_TABLE] = layout
     files.setdefault(
         "resources/README.txt", b"Files named by a relative path are looked for here.\n"
     )

@@ -16,6 +16,7 @@ from vehicle_rig import (
     CORNERS,
     NO_DRAG,
     NO_GRIP,
+    NO_KINEMATICS,
     Array,
     G,
     Record,
@@ -33,14 +34,6 @@ from cosim.road.track import DS
 
 REST, RESPONSE = "Rest and small motions", "Frequency responses"
 TWO_SIDES = np.array([-4.5, -0.3, 0.3, 4.5])  # columns of a road with a left and a right half
-NO_KINEMATICS = {
-    k: v
-    for name in (
-        "RollCentre", "Recession", "RecessionCurve", "KnucklePitch",
-        "Camber", "CamberCurve", "BumpSteer",
-    )
-    for k, v in each(f"Kin.{name}@", 0.0).items()
-}  # fmt: skip
 
 
 def modes_hz(kinematics: bool = True) -> Array:

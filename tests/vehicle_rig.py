@@ -42,6 +42,14 @@ NO_GRIP: dict[str, Value] = {
     "Tire.CarcassDampingX": 0.0, "Tire.CarcassDampingY": 0.0, "Tire.StandstillDamping": 0.0,
     "Tire.LoadDependentRadius": False,
 }  # fmt: skip
+NO_KINEMATICS: dict[str, Value] = {
+    k: v
+    for name in (
+        "RollCentre", "Recession", "RecessionCurve", "KnucklePitch",
+        "Camber", "CamberCurve", "BumpSteer",
+    )
+    for k, v in each(f"Kin.{name}@", 0.0).items()
+}  # fmt: skip
 TABLE_SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)  # of the damper tables [m/s]
 
 
