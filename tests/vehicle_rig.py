@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from cosim.fmi import Description, Slave, Value
 from cosim.road.crg import write_crg
+from cosim.road.grid import RoadGrid
 from cosim.road.track import DS, Track
 from cosim.vehicle import builtin_fmu
 
@@ -210,7 +211,7 @@ def straight_road(
     track = straight_track(length, grade)
     v = np.array([-4.5, 4.5]) if columns is None else columns
     grid = np.broadcast_to(elevation(track.s[:, None], v), (len(track.s), len(v)))
-    write_crg(path, track, v, grid.astype(np.float32))
+    write_crg(path, track, RoadGrid(track.s, v, grid.astype(np.float32)))
     return str(path)
 
 

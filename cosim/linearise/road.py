@@ -20,6 +20,7 @@ from cosim.linearise.fmu import STEP, Steps, linearise
 from cosim.linearise.model import LinearModel
 from cosim.quantities import CORNERS
 from cosim.road.crg import write_crg
+from cosim.road.grid import RoadGrid
 from cosim.road.track import DS, Track
 
 Array = npt.NDArray[np.float64]
@@ -133,5 +134,5 @@ class Roads:
         along = (s > 0.0) == front
         across = (COLUMNS > 0.0) == left
         grid = np.outer((height + slope * s) * along, across)
-        write_crg(path, track, COLUMNS, grid.astype(np.float32))
+        write_crg(path, track, RoadGrid(s, COLUMNS, grid.astype(np.float32)))
         return str(path)
