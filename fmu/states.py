@@ -5,14 +5,16 @@ what the FMI layer saves last, gets a table of the state's doubles in its FMUs. 
 linearise the model (cosim/linearise).
 """
 
+import json
 import re
 
 from variables import TableError
 
-STATE_TABLE = "extra/org.suspension-cosim/states.csv"
+STATE_TABLE = "extra/org.suspension-cosim/states.json"
 CORNERS = ("FL", "FR", "RL", "RR")
 PARTS = {"double": ("",), "Vec": ("x", "y", "z"), "Four": CORNERS}
 SIZES = {"double": 8, "int": 4}
+CHECKSUM_AT = 64  # in serialised bytes, behind the token (common/state.c): FNV-1a of all behind it
 
 
 def fields(header: str, struct: str) -> list[tuple[str, str, str]]:
@@ -56,10 +58,15 @@ def bytes_behind(header: str) -> int:
 
 
 def state_table(header: str) -> bytes | None:
-    """``states.csv``: each double's name and its distance from the end of a serialised state."""
+    """``states.json``: the names of the state's doubles, how many bytes before the end of a
+    serialised state the first one stands, and where the checksum is that has to go with them.
+    """
     names = state_names(header)
     if not names:
         return None
-    end = bytes_behind(header) + 8 * len(names)
-    rows = [f"{name},{end - 8 * i}\n" for i, name in enumerate(names)]
-    return ("name,bytes before the end\n" + "".join(rows)).encode()
+    table = {
+        "doubles": names,
+        "bytes_before_end": bytes_behind(header) + 8 * len(names),
+        "fnv1a_checksum_at": CHECKSUM_AT,
+    }
+    return (json.dumps(table, indent=1) + "\n").encode()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from importlib import import_module
 
 import pytest
@@ -33,11 +34,9 @@ def test_names_in_their_order() -> None:
 
 def test_places_count_the_padding() -> None:
     """An int, padded to the double behind it, then five ints padded to eight bytes."""
-    rows = (states.state_table(HEADER) or b"").decode().splitlines()
-    behind = 8 + 8 + 24
-    assert rows[0] == "name,bytes before the end"
-    assert rows[1] == f"place.x,{16 * 8 + behind}"
-    assert rows[-1] == f"spin.RR,{8 + behind}"
+    table = json.loads(states.state_table(HEADER) or b"")
+    assert table["doubles"][0] == "place.x"
+    assert table["bytes_before_end"] == 16 * 8 + 8 + 8 + 24
 
 
 def test_a_model_without_a_state_has_no_table() -> None:

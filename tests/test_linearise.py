@@ -144,5 +144,5 @@ def test_an_fmu_that_does_not_tell_its_state(tmp_path: Path) -> None:
         for name in own.namelist():
             if name != TABLE:
                 other.writestr(name, own.read(name))
-    with pytest.raises(FmuError, match=r"silent\.fmu: has no extra/.*states\.csv"):
+    with pytest.raises(FmuError, match=r"silent\.fmu: has no extra/.*states\.json"):
         linearise(Description(path), START, HELD, OUTPUTS)

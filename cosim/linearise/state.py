@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
+import json
 import zipfile
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from cosim.errors import FmuError
 
 Array = npt.NDArray[np.float64]
 
-TABLE = "extra/org.suspension-cosim/states.csv"
+TABLE = "extra/org.suspension-cosim/states.json"
 _Q = "quaternion"
 
 
@@ -30,9 +29,10 @@ class StateLayout:
         with zipfile.ZipFile(fmu) as archive:
             if TABLE not in archive.namelist():
                 raise FmuError(f"{fmu.name}: has no {TABLE}, so its state cannot be linearised")
-            rows = list(csv.reader(io.StringIO(archive.read(TABLE).decode())))[1:]
-        self.words = tuple(row[0] for row in rows)
-        self._before_end = int(rows[0][1])
+            table = json.loads(archive.read(TABLE))
+        self.words = tuple(str(name) for name in table["doubles"])
+        self._before_end = int(table["bytes_before_end"])
+        self._checksum = int(table["fnv1a_checksum_at"])
         self._q = [i for i, name in enumerate(self.words) if name.split(".")[0] == _Q]
         plain = [i for i in range(len(self.words)) if i not in self._q]
         self._plain = plain
@@ -48,7 +48,9 @@ class StateLayout:
         """Return the serialised state with these doubles in it."""
         start = len(saved) - self._before_end
         block = words.astype(np.float64).tobytes()
-        return saved[:start] + block + saved[start + len(block) :]
+        behind = self._checksum + 8
+        content = saved[behind:start] + block + saved[start + len(block) :]
+        return saved[: self._checksum] + _fnv1a(content).to_bytes(8, "little") + content
 
     def sizes(self, words: Array) -> Array:
         """Return the coordinates' own values, an attitude's as zero, shape (coordinates,)."""
@@ -72,6 +74,14 @@ class StateLayout:
             return np.asarray(plain)
         inverse = reference[self._q] * np.array([1.0, -1.0, -1.0, -1.0])
         return np.concatenate([plain, 2.0 * _product(inverse, words[self._q])[1:]])
+
+
+def _fnv1a(content: bytes) -> int:
+    """Return the 64-bit FNV-1a checksum."""
+    checksum = 14695981039346656037
+    for byte in content:
+        checksum = (checksum ^ byte) * 1099511628211 & 0xFFFFFFFFFFFFFFFF
+    return checksum
 
 
 def _product(a: Array, b: Array) -> Array:
