@@ -9,13 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from gates import at_most, between, gate
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plant_probe import Probe
+from plant_probe import Array, Probe
+from vehiclemodels.utils import tire_model
 
 FZ0, R0, STIFFNESS = 6000.0, 0.3705, 225368.0
 COEFFICIENTS = {
@@ -126,11 +130,71 @@ def test_forces_are_those_of_the_published_equations(friction: tuple[float, floa
                     assert abs(got[name] - value) <= TOLERANCE * size, where
 
 
+# ---------------------------------------------------------------- tyres that others wrote
+
+TYRES = "Tyres"
+
+
+def errors_against(expected: Array, plant: Probe) -> list[float]:
+    """Fx, Fy, Mz: largest difference over the largest value; columns Fz kappa alpha gamma, F."""
+    found = []
+    for Fz, kappa, alpha, gamma in expected[:, :4]:
+        forces = plant.magic_formula(Fz, kappa, math.tan(alpha), gamma, 1.0)
+        found.append([forces[name] for name in ("Fx", "Fy", "Mz")])
+    wanted = expected[:, 4:]
+    off = np.abs(np.array(found)[:, : wanted.shape[1]] - wanted)
+    return list(off.max(axis=0) / np.abs(wanted).max(axis=0))
+
+
+def test_forces_are_those_of_opentire(plant: Probe) -> None:
+    """180 points over load, camber and slips, by a program of other authors."""
+    path = Path(__file__).with_name("pac2002_opentire.csv")
+    expected = np.loadtxt(path, delimiter=",", comments=("#", "Fz"))
+    assert expected.shape == (180, 7)
+    check = "180 points of load, slips, camber: Fx, Fy, Mz, error over the largest [-]"
+    oracle = "OpenTire's PAC2002, values in tests/pac2002_opentire.csv"
+    gate(TYRES, check, oracle, errors_against(expected, plant), at_most(1e-9))
+
+
+def commonroad(kappa: float, alpha: float) -> tuple[float, float]:
+    """Fx and Fy by CommonRoad's tyre at the nominal load, without camber; its kappa brakes."""
+    c, side = COEFFICIENTS, math.copysign(1.0, alpha)
+    values = {
+        **{f"p_{n.lower()[1:]}": c[n] for n in ("PCX1", "PDX1", "PEX1", "PKX1", "PCY1")},
+        **{f"r_{n.lower()[1:]}": c[n] for n in ("RBX1", "RBX2", "RCX1", "RHX1")},
+        **{f"r_{n.lower()[1:]}": c[n] for n in ("RBY1", "RBY2", "RBY3", "RCY1", "REY1")},
+        "r_ex1": min(c["REX1"], 1.0),  # that program leaves the bound E <= 1 to its user
+        "p_dy1": 0.97 * c["PDY1"],
+        "p_ey1": c["PEY1"] * (1.0 - c["PEY3"] * side),
+        "p_ky1": c["PKY1"] * math.sin(2.0 * math.atan(1.0 / c["PKY2"])),
+        **dict.fromkeys(("p_dx3", "p_hx1", "p_vx1", "p_dy3", "p_hy1", "p_hy3", "p_vy1"), 0.0),
+        **dict.fromkeys(("p_vy3", "r_hy1", *(f"r_vy{k}" for k in (1, 3, 4, 5, 6))), 0.0),
+    }
+    p = SimpleNamespace(**values)
+    Fx0 = tire_model.formula_longitudinal(-kappa, 0.0, FZ0, p)
+    Fy0, mu = tire_model.formula_lateral(alpha, 0.0, FZ0, p)
+    Fx = tire_model.formula_longitudinal_comb(-kappa, alpha, Fx0, p)
+    return Fx, tire_model.formula_lateral_comb(-kappa, alpha, 0.0, mu, FZ0, Fy0, p)
+
+
+def test_forces_are_those_of_commonroads_tyre(plant: Probe) -> None:
+    """The Magic Formula of the package commonroad-vehicle-models, which knows one load."""
+    slips = np.linspace(-0.6, 0.6, 25)
+    expected = np.array(
+        [(FZ0, k, a, 0.0, *commonroad(float(k), float(a))) for k in slips for a in slips]
+    )
+    check = "625 slips at the nominal load: Fx, Fy, error over the largest [-]"
+    oracle = "package commonroad-vehicle-models"
+    gate(TYRES, check, oracle, errors_against(expected, plant), at_most(1e-12))
+
+
 def test_known_points_of_the_tyre() -> None:
     unscaled, small = Probe({"Tire.FrictionX": 1.0, "Tire.FrictionY": 1.0}), 1e-7
     at_rest = unscaled.magic_formula(FZ0, small, 0.0, 0.0, 1.0)
     aside = unscaled.magic_formula(FZ0, 0.0, small, 0.0, 1.0)
-    assert aside["Fy"] / small == pytest.approx(-100.87e3, rel=1e-4)  # N/rad
+    check = "cornering stiffness at 6 kN [kN/rad]"
+    stiffness = -aside["Fy"] / small / 1e3
+    gate(TYRES, check, "PKY1 Fz0 sin(2 atan(1 / PKY2))", stiffness, between(100.86, 100.88))
     assert at_rest["Fx"] / small == pytest.approx(113.3e3, rel=1e-3)
     assert (at_rest["peak_x"], aside["peak_y"]) == pytest.approx((1.139 * FZ0, 1.014 * FZ0))
     largest = max(-unscaled.magic_formula(FZ0, 0, t, 0, 1.0)["Fy"] for t in np.arange(0, 1, 1e-3))
