@@ -113,6 +113,7 @@ def assemble(
     recorder = Recorder(record_groups(), steps + 1, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, initial)
     files = {"fmu": description.path, "network": network, "road": course.file}
+    files |= {f"variant {name}": path for name, path in scenario.variants.files.items()}
     return Assembly(
         recorder=recorder,
         files={name: path for name, path in files.items() if path is not None},
@@ -183,7 +184,7 @@ def _start_values(
     """Return the start values; of ours, another FMU gets those that it has by the same names."""
     own = builtin_start(course, speed, passive, scenario.road.friction)
     known = {name: value for name, value in own.items() if name in description.variables}
-    return known | scenario.vehicle.parameters
+    return known | scenario.parameters
 
 
 def _network(scenario: Scenario) -> Path:
@@ -208,7 +209,7 @@ def _controller(scenario: Scenario, settings: Passive | SkyhookSettings) -> Cont
         settings.feedback == "truth",
         settings.gain_ns_per_m,
         settings.initial_command,
-        damper_map(scenario.vehicle.parameters),
+        damper_map(scenario.parameters),
     )
 
 

@@ -288,7 +288,9 @@ def finite(value: Any) -> Any:
 
 
 def resolved_yaml(scenario: Scenario) -> str:
-    """Return the scenario with every default and override filled in and absolute paths, as YAML."""
+    """Return the scenario with every default and override filled in, variants as parameters and
+    absolute paths, as YAML.
+    """
     import io
 
     from ruamel.yaml import YAML
@@ -297,6 +299,8 @@ def resolved_yaml(scenario: Scenario) -> str:
     if scenario.road.file is not None:
         data["road"]["file"] = str(scenario.resolve(scenario.road.file).resolve())
         del data["road"]["surface"], data["road"]["obstacles"]
+    data["vehicle"]["parameters"] = scenario.parameters
+    del data["vehicle"]["variants"]
     if scenario.vehicle.fmu != "builtin":
         data["vehicle"]["fmu"] = str(scenario.resolve(scenario.vehicle.fmu).resolve())
         del data["vehicle"]["fmi_version"]

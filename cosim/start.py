@@ -39,8 +39,8 @@ def builtin_start(
 
 
 def checked_parameters(scenario: Scenario, description: Description) -> list[Problem]:
-    """Return what is wrong with `vehicle.parameters`: names, types, ranges, settings made
-    elsewhere; and a friction that the FMU cannot take.
+    """Return what is wrong with the vehicle's parameters, those of its variants too: names, types,
+    ranges, settings made elsewhere; and a friction that the FMU cannot take.
     """
     own = scenario.vehicle.fmu == "builtin"
     parameters = {
@@ -57,8 +57,8 @@ def checked_parameters(scenario: Scenario, description: Description) -> list[Pro
             "leave road.friction out, and set the FMU's own under vehicle.parameters"
         )
         problems.append(scenario.problem(("road", "friction"), sentence))
-    for name, value in scenario.vehicle.parameters.items():
-        key = ("vehicle", "parameters", name)
+    for name, value in scenario.parameters.items():
+        key = scenario.parameter_key(name)
         variable = parameters.get(name)
         if variable is None:
             sentence = f"'{description.path.name}' has no parameter '{name}'"

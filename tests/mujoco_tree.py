@@ -60,7 +60,13 @@ def sprung_body(p: dict[str, float]) -> Sprung:
     across = p["Wheel.CarrierInertiaX"]
     own = np.diag([across, p["Wheel.CarrierInertiaY"] + p["Wheel.Inertia"], across])
     rest = whole - shifted(mass, cog) - sum(shifted(corner_mass, r) + own for r in points)
-    return Sprung(mass, cog, np.diag(rest).copy())
+    load = np.array([p["Load.X"], p["Load.Y"], p["Load.Z"]])
+    both = mass + p["Load.Mass"]
+    centre = (mass * cog + p["Load.Mass"] * load) / both
+    own_load = np.diag([p["Load.InertiaRoll"], p["Load.InertiaPitch"], p["Load.InertiaYaw"]])
+    loaded = rest + shifted(mass, cog - centre) + shifted(p["Load.Mass"], load - centre)
+    carried = loaded + own_load if p["Load.Mass"] > 0 else rest
+    return Sprung(both, centre, np.diag(carried).copy())
 
 
 def tree(p: dict[str, float]) -> Any:

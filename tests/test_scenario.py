@@ -98,7 +98,7 @@ def test_a_field_in_the_wrong_section_is_sent_to_the_right_one(tmp_path):
     ("text", "part"),
     [
         ("", "is empty"),
-        ("- a\n- b\n", "a scenario is a mapping"),
+        ("- a\n- b\n", "a mapping of fields to values belongs here"),
         ("name: [a\nroad: 1\n", "not YAML 1.2"),
         ("name: a\n\troad: 1\n", "not YAML 1.2"),
         ("name: a\n---\nname: b\n", "not YAML 1.2"),

@@ -24,7 +24,11 @@ PAYLOAD = {  # five persons and luggage: heavier, higher, further back, other in
     "Body.CogToLeft": 0.80, "Body.CogToRight": 0.825, "Body.InertiaRoll": 790.0,
     "Body.InertiaPitch": 3500.0, "Body.InertiaYaw": 3890.0, "Body.UnsprungMass": 252.4,
 }  # fmt: skip
-VARIANTS = {"the table's car": {}, "uneven car": SETTINGS, "payload": PAYLOAD}
+LOAD = {  # on the table's car: at the back, to one side, high up
+    "Load.Mass": 400.0, "Load.X": -0.5, "Load.Y": 0.2, "Load.Z": 0.35,
+    "Load.InertiaRoll": 40.0, "Load.InertiaPitch": 110.0, "Load.InertiaYaw": 130.0,
+}  # fmt: skip
+VARIANTS = {"the table's car": {}, "uneven car": SETTINGS, "payload": PAYLOAD, "load": LOAD}
 
 
 @pytest.fixture(params=VARIANTS, scope="module")

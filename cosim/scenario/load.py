@@ -12,8 +12,9 @@ from cosim.errors import InputError, Place, Problem, did_you_mean
 from cosim.limits import check_metric
 from cosim.scenario.messages import problems_of
 from cosim.scenario.overrides import apply_override
-from cosim.scenario.schema import Scenario
+from cosim.scenario.schema import Scenario, json_schema
 from cosim.scenario.source import Key, Source, read
+from cosim.scenario.variants import combine
 from sensor.paper import paper_rows
 
 # Fields that name a file, the word that needs none, and the ending that the file must have.
@@ -43,10 +44,14 @@ def load_labelled(path: str | Path, overrides: Sequence[tuple[str, str]]) -> Sce
     try:
         scenario = Scenario.model_validate(data)
     except ValidationError as error:
-        problems += problems_of(error, data, source)
+        problems += problems_of(error, data, source, json_schema())
+    else:
+        vehicle = scenario.vehicle
+        scenario._source = source
+        scenario._variants, found = combine(vehicle.variants, vehicle.parameters, source)
+        problems += found
     if problems:
         raise InputError(sorted(problems, key=_order))
-    scenario._source = source
     return scenario
 
 

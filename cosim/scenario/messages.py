@@ -8,7 +8,6 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from cosim.errors import Problem, did_you_mean
-from cosim.scenario.schema import json_schema
 from cosim.scenario.source import Key, Source
 
 BOUNDS: Final = {
@@ -34,9 +33,12 @@ EXPECTED: Final = {
 }
 
 
-def problems_of(error: ValidationError, data: Any, source: Source) -> Iterator[Problem]:
-    """Yield each of pydantic's findings as a problem at its place in the file."""
-    schema = json_schema()
+def problems_of(
+    error: ValidationError, data: Any, source: Source, schema: dict[str, Any]
+) -> Iterator[Problem]:
+    """Yield each of pydantic's findings as a problem at its place in the file; `schema` is the JSON
+    Schema of the whole file, whose title says what it is.
+    """
     for finding in error.errors(include_url=False):
         if finding["type"] == "too_short" and finding["input"]:
             continue  # not empty in the file: its items are wrong, and are reported themselves
@@ -63,12 +65,12 @@ def _key(location: tuple[str | int, ...], data: Any, kind: str) -> Key:
 
 def _sentence(finding: dict[str, Any], key: Key, schema: dict[str, Any]) -> str:
     kind, context, value = finding["type"], finding.get("ctx", {}), finding["input"]
-    name, above = _dotted(key), _dotted(key[:-1])
+    name, above, whole = _dotted(key), _dotted(key[:-1]), schema["title"].lower()
     unit = _unit(_descend(schema, finding["loc"]))
     if kind == "extra_forbidden":
         return _unknown(str(key[-1]), above, finding["loc"], schema)
     if kind == "missing":
-        return f"{above or 'the scenario'} has no {key[-1]}, which it needs"
+        return f"{above or f'the {whole}'} has no {key[-1]}, which it needs"
     if kind == "literal_error":
         choices = _choices(_descend(schema, finding["loc"]))
         hint = did_you_mean(str(value), choices)
@@ -86,12 +88,12 @@ def _sentence(finding: dict[str, Any], key: Key, schema: dict[str, Any]) -> str:
     message = str(finding["msg"])
     if message.startswith("must "):
         return f"{name} {message}, not {_shown(value)}{context.get('hint', '')}"
-    return f"{name or 'the scenario'}: {message}"
+    return f"{name or f'the {whole}'}: {message}"
 
 
 def _unknown(name: str, above: str, location: Key, schema: dict[str, Any]) -> str:
     fields = list(_descend(schema, location[:-1]).get("properties", {}))
-    sentence = f"'{name}' is not a field of {above or 'a scenario'}"
+    sentence = f"'{name}' is not a field of {above or 'a ' + schema['title'].lower()}"
     for section, entry in schema["properties"].items():
         if name in _resolve(entry, schema).get("properties", {}):
             return f"{sentence}; it belongs to {section}"

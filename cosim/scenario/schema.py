@@ -26,6 +26,7 @@ from cosim.scenario.limit import Limit
 from cosim.scenario.model import Model, with_unit
 from cosim.scenario.road import Road
 from cosim.scenario.source import Key, Source
+from cosim.scenario.variants import Value, Variants
 from cosim.scenario.vehicle import Vehicle
 
 SCHEMA_ID: Final = "https://json-schema.org/draft/2020-12/schema"
@@ -82,6 +83,7 @@ class Scenario(Model):
     )
 
     _source: Source = PrivateAttr(default_factory=Source)
+    _variants: Variants = PrivateAttr(default_factory=Variants)
 
     @field_validator("controllers")
     @classmethod
@@ -101,6 +103,22 @@ class Scenario(Model):
                 "limit_surface", "a limit's surface belongs to a track; a road file has its own"
             )
         return self
+
+    @property
+    def variants(self) -> Variants:
+        """What `vehicle.variants` stands for."""
+        return self._variants
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """The vehicle's start values: the variants', overridden by `vehicle.parameters`."""
+        return {**self._variants.parameters, **self.vehicle.parameters}
+
+    def parameter_key(self, name: str) -> Key:
+        """Return the path of what sets a parameter: its own field, or a variant's name."""
+        if name in self.vehicle.parameters or name not in self._variants.origin:
+            return ("vehicle", "parameters", name)
+        return ("vehicle", "variants", self._variants.origin[name])
 
     @property
     def file(self) -> Path | None:

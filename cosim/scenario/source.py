@@ -64,8 +64,12 @@ class Source:
         return Place(str(self.path), line, column, source, length)
 
 
-def read(path: Path) -> tuple[dict[str, Any], Source, list[Problem]]:
+def read(
+    path: Path, needs: str = "a scenario needs at least name and road"
+) -> tuple[dict[str, Any], Source, list[Problem]]:
     """Read a YAML file into plain values, its source and the problems that do not stop the reading.
+
+    `needs` ends the message about a file without content.
 
     Raises `InputError` when there is no file, no text or no mapping to go on with.
     """
@@ -79,7 +83,7 @@ def read(path: Path) -> tuple[dict[str, Any], Source, list[Problem]]:
     try:
         root = yaml.compose(io.StringIO(text))
         if root is None:
-            raise InputError(Problem(f"{path} is empty; a scenario needs at least name and road"))
+            raise InputError(Problem(f"{path} is empty; {needs}"))
         problems += _walk(root, (), source, ())
         data = yaml.constructor.construct_document(root)
     except MarkedYAMLError as error:
@@ -87,7 +91,7 @@ def read(path: Path) -> tuple[dict[str, Any], Source, list[Problem]]:
     except (YAMLError, ValueError) as error:
         raise InputError(f"{path}: this is not YAML 1.2: {_one_line(error)}") from None
     if not isinstance(data, dict):
-        raise InputError(Problem("a scenario is a mapping of fields to values", source.locate(())))
+        raise InputError(Problem("a mapping of fields to values belongs here", source.locate(())))
     return data, source, problems
 
 

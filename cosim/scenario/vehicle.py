@@ -28,6 +28,10 @@ class Variable(Model):
 Parameter = Annotated[bool | float | str, BeforeValidator(_check_parameter)]
 
 
+def _listed(value: object) -> object:
+    return (value,) if isinstance(value, str) else value
+
+
 class Vehicle(Model):
     """The vehicle FMU and its parameters."""
 
@@ -39,8 +43,16 @@ class Vehicle(Model):
     fmi_version: Literal[2, 3] = Field(
         default=3, description="which of the built-in FMUs; builtin only"
     )
+    variants: Annotated[
+        tuple[str, ...], BeforeValidator(_listed, json_schema_input_type=str | tuple[str, ...])
+    ] = Field(
+        default=(),
+        strict=False,
+        description="sets of parameters by name or by a YAML file relative to the scenario file",
+    )
     parameters: dict[str, Parameter] = Field(
-        default_factory=dict, description="start values by the FMU's own names, in its units"
+        default_factory=dict,
+        description="start values by the FMU's names, in its units; they override variants",
     )
     variables: dict[str, Variable] = Field(
         default_factory=dict, description="quantity to variable, for an FMU with other names"

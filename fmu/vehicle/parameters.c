@@ -35,6 +35,18 @@ static void corners(const Variables *p, Vehicle *c) {
     }
 }
 
+/* A load on the body of the empty vehicle: common centre of gravity and inertia (parallel axes; products of inertia are
+ * left out, as the empty vehicle's are). The springs keep their preload, so the car sinks. */
+static void carry_load(const Variables *p, double *mass, Vec *centre, Vec *inertia) {
+    const Vec apart = sub(vec(p->Load_X, p->Load_Y, p->Load_Z), *centre);
+    const double whole = *mass + p->Load_Mass, reduced = *mass * p->Load_Mass / whole;
+    inertia->x += p->Load_InertiaRoll + reduced * (apart.y * apart.y + apart.z * apart.z);
+    inertia->y += p->Load_InertiaPitch + reduced * (apart.x * apart.x + apart.z * apart.z);
+    inertia->z += p->Load_InertiaYaw + reduced * (apart.x * apart.x + apart.y * apart.y);
+    *centre = axpy(p->Load_Mass / whole, apart, *centre);
+    *mass = whole;
+}
+
 /* The table's centre of gravity and inertias are the whole vehicle's: take the carriers and wheels out of them. */
 static void sprung_mass(const Variables *p, Vehicle *c) {
     c->body_mass = p->Body_Mass - p->Body_UnsprungMass;
@@ -47,10 +59,11 @@ static void sprung_mass(const Variables *p, Vehicle *c) {
         inertia.y -= c->carrier_mass * (r.x * r.x + r.z * r.z) + p->Wheel_CarrierInertiaY + p->Wheel_Inertia;
         inertia.z -= c->carrier_mass * (r.x * r.x + r.y * r.y) + p->Wheel_CarrierInertiaX;
     }
-    const Vec o = scale(-1 / c->body_mass, moment); /* sprung centre of gravity from the whole vehicle's */
+    Vec o = scale(-1 / c->body_mass, moment); /* sprung centre of gravity from the whole vehicle's */
     inertia.x -= c->body_mass * (o.y * o.y + o.z * o.z);
     inertia.y -= c->body_mass * (o.x * o.x + o.z * o.z);
     inertia.z -= c->body_mass * (o.x * o.x + o.y * o.y);
+    if (p->Load_Mass > 0) carry_load(p, &c->body_mass, &o, &inertia);
     c->body_inertia = inertia;
     c->cog = scale(-1, o);
     for (int i = 0; i < CORNERS; ++i) c->hub[i] = sub(c->hub[i], o);

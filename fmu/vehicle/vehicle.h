@@ -45,7 +45,7 @@ typedef struct {
 /* Constant for one parameterisation. */
 typedef struct {
     Road *road;       /* NULL: flat */
-    double body_mass; /* sprung */
+    double body_mass; /* sprung, with its load */
     Vec body_inertia; /* sprung, principal, about its own centre of gravity */
     double carrier_mass;
     Vec hub[CORNERS]; /* wheel centre at q = 0, from the reference point */
