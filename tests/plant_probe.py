@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 VEHICLE = ROOT / "fmu" / "vehicle"
 PROBE = ROOT / "tests" / "vehicle_probe" / "probe.c"
-FLAGS = ["-std=c11", "-O1", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Werror"]
+FLAGS = [*build.PORTABLE, "-Wall", "-Wextra", "-Werror"]
 
 MOTION = np.dtype(
     [
@@ -60,6 +60,7 @@ SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "rolling_radius": (_REAL, _POINTER, _REAL, _REAL),
     "tyre": (None, _POINTER, _POINTER, _INT, _POINTER),
     "damper": (_REAL, _POINTER, _INT, _REAL),
+    "elementary": (None, _INT, _INT, _POINTER, _POINTER),
 }
 
 
@@ -72,7 +73,7 @@ def library() -> Path:
     table = variables.read_table(VEHICLE / "variables.toml")
     (folder / "variables.h").write_text(generate.header(table), encoding="utf-8")
     (folder / "variables.c").write_text(generate.source(table, "{}"), encoding="utf-8")
-    sources = [path for path in sorted(VEHICLE.glob("*.c")) if path.name != "tyre.c"]
+    sources = sorted(VEHICLE.glob("*.c"))
     include = [f"-I{path}" for path in (folder, VEHICLE, ROOT / "fmu" / "common")]
     target = folder / "probe.so"
     command = [
@@ -134,6 +135,13 @@ class Probe:
             given[name] = value
         self._lib.probe_tyre(self._plant, given.ctypes.data, corner, out.ctypes.data)
         return dict(zip(GRIP_NAMES, out.tolist(), strict=True))
+
+    def elementary(self, which: int, x: Array) -> Array:
+        """The plant's own sine (0), cosine (1), arctangent (2) or exponential (3) of each x."""
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        out = np.empty_like(x)
+        self._lib.probe_elementary(which, len(x), x.ctypes.data, out.ctypes.data)
+        return out
 
     def relaxation_y(self, Fz: float, radius: float) -> float:
         """Lateral relaxation length."""

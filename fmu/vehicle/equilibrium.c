@@ -4,6 +4,8 @@
  * nine accelerations vanish; Newton's method with a finite-difference Jacobian on the model's own derivative. The
  * states behind (spins, motor torques, brakes, rack) are set to the values that balance. */
 #include <string.h>
+#include "powertrain.h"
+#include "tyre.h"
 #include "vehicle.h"
 
 enum { UNKNOWNS = 9, ITERATIONS = 40 };
@@ -35,35 +37,29 @@ static void set_pose(Start *s, const double y[UNKNOWNS]) {
     euler_quaternion(y[1], y[2], p->Init_Yaw, x->quaternion);
     rotation(x->quaternion, R);
     x->position = sub(vec(p->Init_x, p->Init_y, y[0]), to_inertial(R, s->c->cog));
-    memcpy(x->travel, y + 3, sizeof x->travel);
+    x->travel = FOUR(y + 3);
 }
 
 /* Velocity along the road, spins, carcass, motors, brakes and rack as the pose and the slips ask. */
 static void set_balance(Start *s, double slip_x, double slip_y) {
     State *x = &s->memory->x;
     const Variables *p = &s->model->v;
-    Vec normal = vec(0, 0, 0);
-    for (int i = 0; i < CORNERS; ++i) normal = add(normal, s->w.contact[i].normal);
-    normal = unit(normal);
+    const Tyre *t = &s->w.tyre;
+    const Vec normal = unit(total(s->w.contact.normal));
     const Vec forward = unit(sub(vec(1, 0, 0), scale(normal.x, normal)));
     x->velocity = add(scale(s->speed, forward), scale(s->speed * slip_y, cross(normal, forward)));
-    for (int i = 0; i < CORNERS; ++i) {
-        const Tyre *t = &s->w.tyre[i];
-        const Corner *k = &s->w.corner[i];
-        x->spin[i] = dot(x->velocity, s->w.contact[i].forward) * (1 + slip_x) / t->rolling_radius;
-        x->stretch_x[i] = slip_x * p->Tire_RelaxationX;
-        x->stretch_y[i] = -slip_y * tyre_relaxation_y(p, t->Fz, s->c->radius[i]);
-        x->compliance[i] = p->Kin_LateralForceSteer[i] * t->Fy;
-        const double torque = -s->w.axial_moment[i];
-        if (s->speed > 0) {
-            x->windup[i] = torque / p->PT_ShaftStiffness[i];
-            x->motor_torque[i] = torque / p->PT_GearRatio;
-        } else {
-            const double holds = clamp(-torque, -x->brake_torque[i], x->brake_torque[i]);
-            x->brake_windup[i] = holds / p->Brake_Stiffness;
-        }
-        x->motor_speed[i] = x->spin[i] - dot(x->rate, k->axle);
+    x->spin = dot(spread(x->velocity), s->w.contact.forward) * (1 + slip_x) / t->rolling_radius;
+    x->stretch_x = splat(slip_x * p->Tire_RelaxationX);
+    x->stretch_y = -slip_y * tyre_relaxation_y(p, t->Fz, s->c->radius);
+    x->compliance = FOUR(p->Kin_LateralForceSteer) * t->Fy;
+    const Four torque = -s->w.axial_moment;
+    if (s->speed > 0) {
+        x->windup = torque / FOUR(p->PT_ShaftStiffness);
+        x->motor_torque = torque / p->PT_GearRatio;
+    } else {
+        x->brake_windup = within(-torque, -x->brake_torque, x->brake_torque) / p->Brake_Stiffness;
     }
+    x->motor_speed = x->spin - dot(spread(x->rate), s->w.corner.axle);
     x->rack += s->w.rack_rate * p->Steer_Damping / p->Steer_Stiffness;
 }
 
@@ -113,10 +109,10 @@ static void guess(Start *s, double y[UNKNOWNS]) {
     for (int pass = 0; pass < 3; ++pass) {
         set_pose(s, y);
         evaluate(s);
-        const Contact *t = s->w.contact;
+        const Four z = s->w.contact.height;
         const double wheelbase = p->Body_CogToFront + p->Body_CogToRear, track = s->c->track;
-        const double front = (t[FL].height + t[FR].height) / 2, rear = (t[RL].height + t[RR].height) / 2;
-        const double left = (t[FL].height + t[RL].height) / 2, right = (t[FR].height + t[RR].height) / 2;
+        const double front = (z[FL] + z[FR]) / 2, rear = (z[RL] + z[RR]) / 2;
+        const double left = (z[FL] + z[RL]) / 2, right = (z[FR] + z[RR]) / 2;
         y[1] = atan((left - right) / track);
         y[2] = atan((rear - front) / wheelbase);
         y[0] = (front * p->Body_CogToRear + rear * p->Body_CogToFront) / wheelbase + p->Body_CogHeight;
@@ -127,10 +123,8 @@ ModelStatus equilibrium(Model *m, const Vehicle *c, Memory *memory) {
     static const double limit[UNKNOWNS] = {0.1, 0.1, 0.1, 0.03, 0.03, 0.03, 0.03, 0.05, 0.05};
     Start s = {.model = m, .c = c, .memory = memory, .speed = m->v.Init_Velocity};
     State *x = &memory->x;
-    for (int i = 0; i < CORNERS; ++i) {
-        x->valve[i] = m->v.Car_SuspControl_Damper_CtrlOut[i];
-        x->brake_torque[i] = brake_demand(&m->v, c, i);
-    }
+    x->valve = FOUR(m->v.Car_SuspControl_Damper_CtrlOut);
+    x->brake_torque = brake_demand(&m->v, c);
     double y[UNKNOWNS], f[UNKNOWNS], nudged[UNKNOWNS], A[UNKNOWNS][UNKNOWNS + 1], step[UNKNOWNS];
     guess(&s, y);
     residual(&s, y, f);

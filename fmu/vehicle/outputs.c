@@ -1,4 +1,6 @@
 /* What the tool outside sees: CarMaker's names, from the work of the last evaluation. */
+#include "multibody.h"
+#include "suspension.h"
 #include "vehicle.h"
 
 static Vec point_acceleration(const Work *w, const State *x, Vec r) {
@@ -27,27 +29,32 @@ static void body_outputs(Variables *v, const Vehicle *c, const State *x, const W
     v->Car_SideSlipAngle = atan2(velocity.y, fmax(fabs(velocity.x), 0.1));
 }
 
-static void corner_outputs(Variables *v, const State *x, const Work *w, int i) {
-    const Corner *k = &w->corner[i];
-    const Tyre *t = &w->tyre[i];
-    const double spin = x->spin[i] - dot(k->rate, k->axle), ratio = v->Damp_MotionRatio[i];
-    v->Car_SteerAngle[i] = k->steer;
-    v->Car_WheelSpd[i] = spin;
-    v->Car_v[i] = v->Wheel_KinematicRadius * spin;
-    v->Car_C_q0[i] = x->travel[i];
-    v->Car_C_q0p[i] = x->travel_rate[i];
-    v->Car_Damp_v[i] = -ratio * x->travel_rate[i];
-    v->Car_Damp_l[i] = -ratio * x->travel[i];
-    v->Car_Damp_Frc[i] = w->damper_force[i] / ratio;
-    v->Car_Damp_Ctrl[i] = x->valve[i];
-    v->Car_PaperRelVel[i] = -x->travel_rate[i] + v->Car_vx * sin(v->Body_PaperTilt);
-    v->Car_Fx[i] = t->Fx, v->Car_Fy[i] = t->Fy, v->Car_Fz[i] = t->Fz;
-    v->Car_LongSlip[i] = t->slip_x;
-    v->Car_SlipAngle[i] = atan(t->slip_y);
-    v->Car_Camber[i] = asin(clamp(w->contact[i].sine_inclination, -1, 1));
-    v->Car_zRoad[i] = w->contact[i].height;
-    v->PT_Motor_Trq[i] = x->motor_torque[i];
-    v->Brake_Trq[i] = x->brake_torque[i];
+static void store(double target[CORNERS], Four values) { *(Four *)target = values; }
+
+static Four each(double (*function)(double), Four x) { return (Four){function(x[FL]), function(x[FR]), function(x[RL]), function(x[RR])}; }
+
+static void corner_outputs(Variables *v, const State *x, const Work *w) {
+    const Corners *k = &w->corner;
+    const Tyre *t = &w->tyre;
+    const Four spin = x->spin - dot(k->rate, k->axle), ratio = FOUR(v->Damp_MotionRatio);
+    store(v->Car_SteerAngle, k->steer);
+    store(v->Car_WheelSpd, spin);
+    store(v->Car_v, v->Wheel_KinematicRadius * spin);
+    store(v->Car_C_q0, x->travel);
+    store(v->Car_C_q0p, x->travel_rate);
+    store(v->Car_Damp_v, -ratio * x->travel_rate);
+    store(v->Car_Damp_l, -ratio * x->travel);
+    store(v->Car_Damp_Frc, w->damper_force / ratio);
+    store(v->Car_Damp_Ctrl, x->valve);
+    store(v->Car_PaperRelVel, v->Car_vx * sin(v->Body_PaperTilt) - x->travel_rate);
+    store(v->Car_Fx, t->Fx), store(v->Car_Fy, t->Fy), store(v->Car_Fz, t->Fz);
+    store(v->Car_LongSlip, t->slip_x);
+    store(v->Car_SlipAngle, each(atan, t->slip_y));
+    store(v->Car_GripShare, t->grip_share);
+    store(v->Car_Camber, each(asin, within(w->contact.sine_inclination, splat(-1.0), splat(1.0))));
+    store(v->Car_zRoad, w->contact.height);
+    store(v->PT_Motor_Trq, x->motor_torque);
+    store(v->Brake_Trq, x->brake_torque);
 }
 
 /* Mean of the middle two wheel speeds: neither a locking nor a spinning wheel gets in. */
@@ -69,12 +76,10 @@ static void sensor_outputs(Variables *v, const Vehicle *c, const State *x, const
 static void energy_outputs(Variables *v, const Vehicle *c, const State *x, const Work *w) {
     const double g = v->Env_Gravity;
     double stored = kinetic_energy(v, c, x, w) + suspension_energy(v, c, x) + c->body_mass * g * x->position.z;
-    for (int i = 0; i < CORNERS; ++i) {
-        const Vec hub = add(x->position, to_inertial(w->R, w->corner[i].r));
-        const double deflection = fmax(w->contact[i].deflection, 0);
-        stored += c->carrier_mass * g * hub.z + v->Tire_Stiffness * deflection * deflection / 2;
-        stored += v->PT_ShaftStiffness[i] * x->windup[i] * x->windup[i] / 2; /* the brakes' counts as dissipated */
-    }
+    const Vec4 hub = add(spread(x->position), to_inertial(w->R, w->corner.r));
+    const Four deflection = larger(w->contact.deflection, splat(0.0));
+    stored += sum(c->carrier_mass * g * hub.z + v->Tire_Stiffness * deflection * deflection / 2 +
+                  FOUR(v->PT_ShaftStiffness) * x->windup * x->windup / 2); /* the brakes' counts as dissipated */
     v->Energy_Stored = stored;
     v->Energy_Dissipated = x->dissipated;
     v->Energy_Supplied = x->supplied;
@@ -83,7 +88,7 @@ static void energy_outputs(Variables *v, const Vehicle *c, const State *x, const
 void vehicle_outputs(Variables *v, const Vehicle *c, Memory *m, const Work *w) {
     const State *x = &m->x;
     body_outputs(v, c, x, w);
-    for (int i = 0; i < CORNERS; ++i) corner_outputs(v, x, w, i);
+    corner_outputs(v, x, w);
     sensor_outputs(v, c, x, w);
     energy_outputs(v, c, x, w);
     v->Steer_WhlAng = m->steer;

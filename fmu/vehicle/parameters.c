@@ -24,14 +24,20 @@ static void corners(const Variables *p, Vehicle *c) {
         c->side[i] = left ? 1.0 : -1.0;
         c->radius[i] = p->Tire_Radius * p->Wheel_RadiusScale[i];
         const double loaded = c->radius[i] - load / p->Tire_Stiffness;
-        c->hub[i] = vec(front ? p->Body_CogToFront : -p->Body_CogToRear,
-                        left ? p->Body_CogToLeft : -p->Body_CogToRight, loaded - p->Body_CogHeight);
+        c->hub.x[i] = front ? p->Body_CogToFront : -p->Body_CogToRear;
+        c->hub.y[i] = left ? p->Body_CogToLeft : -p->Body_CogToRight;
+        c->hub.z[i] = loaded - p->Body_CogHeight;
         /* The contact point's lateral slope is 2 h_rc / track; the camber gain brings part of it. */
-        c->lateral_slope[i] = 2 * p->Kin_RollCentre[i] / track - loaded * p->Kin_Camber[i];
+        c->lateral_slope[i] = c->side[i] * (2 * p->Kin_RollCentre[i] / track - loaded * p->Kin_Camber[i]);
         c->preload[i] = load - c->carrier_mass * p->Env_Gravity;
         c->brake_share[i] = (front ? p->Brake_FrontShare : 1 - p->Brake_FrontShare) / 2;
         const double largest = fmax(p->PT_RearShare, 1 - p->PT_RearShare);
         c->drive_share[i] = (front ? 1 - p->PT_RearShare : p->PT_RearShare) / largest;
+        c->bar_rate[i] = (front ? p->Susp_AntiRollFront : p->Susp_AntiRollRear) / (track * track);
+        c->steered[i] = front ? 1.0 : 0.0;
+        c->ackermann_gain[i] = c->steered[i] * c->side[i] * p->Steer_Ackermann * track / (2 * wheelbase);
+        c->sine_caster[i] = sin(p->Kin_Caster[i]), c->cosine_caster[i] = cos(p->Kin_Caster[i]);
+        c->is_imbalanced |= p->Wheel_Imbalance[i] > 0;
     }
 }
 
@@ -53,7 +59,7 @@ static void sprung_mass(const Variables *p, Vehicle *c) {
     Vec moment = vec(0, 0, 0);
     Vec inertia = vec(p->Body_InertiaRoll, p->Body_InertiaPitch, p->Body_InertiaYaw);
     for (int i = 0; i < CORNERS; ++i) {
-        const Vec r = c->hub[i];
+        const Vec r = corner_of(c->hub, i);
         moment = axpy(c->carrier_mass, r, moment);
         inertia.x -= c->carrier_mass * (r.y * r.y + r.z * r.z) + p->Wheel_CarrierInertiaX;
         inertia.y -= c->carrier_mass * (r.x * r.x + r.z * r.z) + p->Wheel_CarrierInertiaY + p->Wheel_Inertia;
@@ -66,7 +72,7 @@ static void sprung_mass(const Variables *p, Vehicle *c) {
     if (p->Load_Mass > 0) carry_load(p, &c->body_mass, &o, &inertia);
     c->body_inertia = inertia;
     c->cog = scale(-1, o);
-    for (int i = 0; i < CORNERS; ++i) c->hub[i] = sub(c->hub[i], o);
+    c->hub = sub(c->hub, spread(o));
     c->seat = sub(vec(p->Body_SeatX, p->Body_SeatY, p->Body_SeatZ), o);
     c->imu = sub(vec(p->Sensor_Imu_X, p->Sensor_Imu_Y, p->Sensor_Imu_Z), o);
 }

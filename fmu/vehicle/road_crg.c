@@ -6,12 +6,10 @@
 #include <stdlib.h>
 
 #include "road_crg_layout.h"
+#include "road_crg_points.h"
 
 /* Of places whose distance differs by less, a search over the whole line takes the first [m]. */
 static const double equally_near = 0.02;
-
-/* Near the centre of a bend u runs away; 1 - curvature * v is not let below this [-]. */
-static const double closest_to_centre = 0.05;
 
 Road *road_load(const char *path, char *error, size_t error_size)
 {
@@ -68,8 +66,7 @@ static inline int segment_at(const Road *road, double u, double *share)
     return i;
 }
 
-/* First node of the whole line that is nearest to (x, y). */
-static int nearest_node(const Road *road, double x, double y)
+int road_search(const Road *road, double x, double y)
 {
     double nearest = INFINITY, limit = INFINITY;
     int best = 0;
@@ -82,98 +79,26 @@ static int nearest_node(const Road *road, double x, double y)
             limit = nearest > equally_near ? (nearest - equally_near) * (nearest - equally_near) : 0.0;
         }
     }
-    return best;
-}
-
-/* How far (x, y) lies beyond the cross section through a node, along the line [m]. */
-static inline double beyond(const Node *p, double x, double y)
-{
-    return (x - p->x) * p->tx + (y - p->y) * p->ty;
-}
-
-/* Walks from segment i to the one whose two cross sections enclose (x, y). */
-static inline int walk(const Road *road, int i, double x, double y, double *behind, double *ahead)
-{
-    const Node *node = road->node;
-    const int last = road->rows - 2;
-
-    *ahead = beyond(&node[i + 1], x, y);
-    while (*ahead > 0.0 && i < last)
-        *ahead = beyond(&node[++i + 1], x, y);
-    *behind = beyond(&node[i], x, y);
-    while (*behind < 0.0 && i > 0) {
-        *ahead = *behind;
-        *behind = beyond(&node[--i], x, y);
-    }
-    return i;
-}
-
-/* Beyond the road's start or end: straight on. */
-static void locate_outside(const Road *road, const Node *end, double x, double y, RoadPosition *out)
-{
-    double dx = x - end->x, dy = y - end->y;
-
-    out->u = road->u_first + (double)(end - road->node) * road->du + dx * end->tx + dy * end->ty;
-    out->v = dy * end->tx - dx * end->ty;
-    out->heading = end->heading;
-    out->tx = end->tx;
-    out->ty = end->ty;
-    out->stretch = 1.0;
+    return best < road->rows - 1 ? best : road->rows - 2;
 }
 
 void road_locate(const Road *road, double x, double y, int *hint, RoadPosition *out)
 {
-    const Node *node = road->node, *a, *b;
-    double behind, ahead, share, dx, dy, curvature, length;
-    int i = *hint >= 0 && *hint <= road->rows - 2 ? *hint : nearest_node(road, x, y);
+    int segment[4];
+    RoadPoints at;
+    const Node *a;
 
-    i = i <= road->rows - 2 ? i : road->rows - 2;
-    *hint = i = walk(road, i, x, y, &behind, &ahead);
-    a = &node[i];
-    b = &node[i + 1];
-    if ((i == 0 && behind < 0.0) || (i == road->rows - 2 && ahead > 0.0)) {
-        locate_outside(road, behind < 0.0 ? a : b, x, y, out);
-        return;
-    }
-    /* A parallel to the segment through (x, y) is cut by the cross sections through a and b; the share of the way
-     * between the two cuts is the share of u (OpenCRG: "evaluation xy to uv"). */
-    dx = b->x - a->x;
-    dy = b->y - a->y;
-    behind *= dx * b->tx + dy * b->ty;
-    ahead *= dx * a->tx + dy * a->ty;
-    share = behind / (behind - ahead);
-    out->u = road->u_first + (i + share) * road->du;
-    out->v = ((y - a->y) * dx - (x - a->x) * dy) / sqrt(dx * dx + dy * dy);
-    out->heading = a->heading + share * (b->heading - a->heading);
-    out->tx = a->tx + share * (b->tx - a->tx);
-    out->ty = a->ty + share * (b->ty - a->ty);
-    length = 1.0 / sqrt(out->tx * out->tx + out->ty * out->ty);
-    out->tx *= length;
-    out->ty *= length;
-    curvature = a->curvature + share * (b->curvature - a->curvature);
-    curvature = 1.0 - curvature * out->v;
-    out->stretch = 1.0 / (curvature > closest_to_centre ? curvature : closest_to_centre);
+    segment[0] = walk(road, *hint >= 0 && *hint <= road->rows - 2 ? *hint : road_search(road, x, y), x, y);
+    segment[1] = segment[2] = segment[3] = *hint = segment[0];
+    road_points(road, segment, splat(x), splat(y), &at);
+    a = &road->node[segment[0]];
+    *out = (RoadPosition){at.u[0], at.v[0], a[0].heading + at.share[0] * (a[1].heading - a[0].heading), at.tx[0], at.ty[0],
+                          at.stretch[0]};
 }
 
 double road_elevation(const Road *road, double u, double v)
 {
-    const int last = road->columns - 1;
-    double share, across, z0, z1, line;
-    int i = segment_at(road, u, &share), j;
-    const Node *a = &road->node[i], *b = a + 1;
-    const float *z;
-
-    v = v > road->v[0] ? v : road->v[0];
-    v = v < road->v[last] ? v : road->v[last];
-    j = road->cell[(int)((v - road->v[0]) * road->inverse_cell)];
-    j += (v >= road->v[j + 1]) & (j < last - 1); /* a cell spans one edge at most; no branch to mispredict */
-    across = (v - road->v[j]) * road->inverse_dv[j];
-    z = road->grid + (size_t)i * (size_t)road->columns + j;
-    z0 = z[0] + across * ((double)z[1] - z[0]);
-    z += road->columns;
-    z1 = z[0] + across * ((double)z[1] - z[0]);
-    line = a->z + v * a->banking + share * (b->z - a->z + v * (b->banking - a->banking));
-    return line + z0 + share * (z1 - z0);
+    return road_elevations(road, splat(u), splat(v))[0];
 }
 
 double road_curvature(const Road *road, double u)

@@ -28,4 +28,7 @@ struct Road {
 /* Lays the road out: reference line, modifiers, cells that are no number, tables. Takes the grid over from `file`. */
 bool crg_layout(Road *road, CrgFile *file);
 
+/* In road_crg.c: the segment at the first node of the whole line that is nearest to (x, y). */
+int road_search(const Road *road, double x, double y);
+
 #endif

@@ -17,19 +17,19 @@ typedef struct {
     Vec position;         /* inertial, m */
     double quaternion[4]; /* body -> inertial (w, x, y, z) */
     Vec velocity, rate;   /* of the reference point and of the body, body axes, m/s and rad/s */
-    double travel[CORNERS], travel_rate[CORNERS];
-    double spin[CORNERS];         /* absolute angular velocity of the wheel about its axis, rad/s */
-    double angle[CORNERS];        /* wheel rotation against the knuckle, rad */
-    double stretch_x[CORNERS];    /* longitudinal carcass deflection, positive when it drives, m */
-    double stretch_y[CORNERS];    /* lateral carcass deflection, positive when the force points left, m */
-    double valve[CORNERS];        /* damper command behind the valve lag */
-    double compliance[CORNERS];   /* compliance steer, rad */
-    double rack;                  /* mean road-wheel angle behind the rack compliance, rad */
-    double motor_torque[CORNERS]; /* at the motor shaft, N m */
-    double motor_speed[CORNERS];  /* referred to the wheel, rad/s */
-    double windup[CORNERS];       /* half-shaft twist, rad */
-    double brake_torque[CORNERS]; /* capacity behind the pressure lag, N m */
-    double brake_windup[CORNERS]; /* elastic twist of the sticking brake, rad */
+    Four travel, travel_rate;
+    Four spin;         /* absolute angular velocity of the wheel about its axis, rad/s */
+    Four angle;        /* wheel rotation against the knuckle, rad */
+    Four stretch_x;    /* longitudinal carcass deflection, positive when it drives, m */
+    Four stretch_y;    /* lateral carcass deflection, positive when the force points left, m */
+    Four valve;        /* damper command behind the valve lag */
+    Four compliance;   /* compliance steer, rad */
+    double rack;       /* mean road-wheel angle behind the rack compliance, rad */
+    Four motor_torque; /* at the motor shaft, N m */
+    Four motor_speed;  /* referred to the wheel, rad/s */
+    Four windup;       /* half-shaft twist, rad */
+    Four brake_torque; /* capacity behind the pressure lag, N m */
+    Four brake_windup; /* elastic twist of the sticking brake, rad */
     double imu[6], imu_rate[6];   /* low-passed IMU readings and their derivatives */
     double dissipated, supplied;  /* energies since the start, J */
 } State;
@@ -38,8 +38,8 @@ enum { STATES = sizeof(State) / sizeof(double) };
 
 typedef struct {
     State x;
-    double steer, gas, brake; /* the inputs that the last step held */
-    int hint[CORNERS + 1];    /* last road segment of each wheel and of the body */
+    double steer;          /* the steering-wheel angle that the last step held */
+    int hint[CORNERS + 1]; /* last road segment of each wheel and of the body */
 } Memory;
 
 /* Constant for one parameterisation. */
@@ -48,88 +48,74 @@ typedef struct {
     double body_mass; /* sprung, with its load */
     Vec body_inertia; /* sprung, principal, about its own centre of gravity */
     double carrier_mass;
-    Vec hub[CORNERS]; /* wheel centre at q = 0, from the reference point */
-    double side[CORNERS];
-    double lateral_slope[CORNERS]; /* dy/dq of the wheel centre that gives the roll centre height */
-    double preload[CORNERS];       /* spring force at q = 0, N */
+    Vec4 hub; /* wheel centre at q = 0, from the reference point */
+    Four side;
+    Four lateral_slope; /* dy/dq of the wheel centre that gives the roll centre height */
+    Four preload;       /* spring force at q = 0, N */
+    Four bar_rate;      /* anti-roll bar force at the wheel per difference of the axle's travels, N/m */
+    Four steered, ackermann_gain;
+    Four sine_caster, cosine_caster;
     double track;
     Vec cog, seat, imu; /* of the whole vehicle; mounts; all from the reference point */
     double imu_axes[9]; /* IMU axes -> body axes */
     Curve passive, soft, hard;
-    double drive_share[CORNERS], brake_share[CORNERS]; /* of one motor's torque; of the total brake torque */
-    double radius[CORNERS];
+    Four drive_share, brake_share; /* of one motor's torque; of the total brake torque */
+    Four radius;
+    int is_imbalanced;
 } Vehicle;
 
-/* One corner's kinematics at the present travel and steer angle, body axes. */
+/* The corners' kinematics at the present travels and steer angles, body axes. */
 typedef struct {
-    Vec r;              /* wheel centre from the reference point */
-    Vec path, path2;    /* dr/dq, d2r/dq2 */
-    Vec turn, turn2;    /* carrier rotation per travel and its derivative, rad/m, rad/m2 */
-    Vec axle;           /* unit wheel axis, to the left */
-    Vec kingpin;        /* unit steering axis, upwards */
-    double steer, steer_rate;
-    Vec v, rate;        /* wheel-centre velocity; angular velocity of the carrier (wheel rotation excluded) */
-} Corner;
+    Vec4 r;              /* wheel centre from the reference point */
+    Vec4 path;           /* dr/dq; its z is 1 */
+    Four path2_x;        /* d2r/dq2, which has no y and z */
+    Vec4 turn, turn2;    /* carrier rotation per travel and its derivative, rad/m, rad/m2 */
+    Vec4 axle;           /* unit wheel axis, to the left */
+    Vec4 kingpin;        /* unit steering axis, upwards */
+    Four steer, steer_rate;
+    Vec4 v, rate;        /* wheel-centre velocity; angular velocity of the carrier (wheel rotation excluded) */
+} Corners;
 
-/* The road under a wheel and the contact axes, body axes. */
+/* The road under the wheels and the contact axes, body axes. */
 typedef struct {
-    double height;           /* patch-averaged elevation, inertial */
-    Vec normal, forward, left;
-    double sine_inclination; /* of the wheel axis against the road plane */
-    double loaded_radius, deflection, deflection_rate;
-    Vec arm;                 /* wheel centre -> contact point */
+    Four height;           /* patch-averaged elevation, inertial */
+    Vec4 normal, forward, left;
+    Four sine_inclination; /* of the wheel axis against the road plane */
+    Four loaded_radius, deflection, deflection_rate;
+    Vec4 arm;              /* wheel centre -> contact point */
 } Contact;
 
 typedef struct {
-    double Fx, Fy, Fz, Mz, My;
-    double slip_x, slip_y;                   /* practical slips after relaxation: kappa, tan(alpha) */
-    double rolling_radius;
-    double stretch_x_rate, stretch_y_rate;
-    double dissipation;                      /* power that does not come back, W */
+    Four Fx, Fy, Fz, Mz, My;
+    Four slip_x, slip_y;                   /* practical slips after relaxation: kappa, tan(alpha) */
+    Four rolling_radius;
+    Four stretch_x_rate, stretch_y_rate;
+    Four grip_share;                       /* of the friction ellipse that the force takes up */
+    Four dissipation;                      /* power that does not come back, W */
 } Tyre;
 
 /* What one evaluation works out on the way from the state to its derivative. */
 typedef struct {
     double R[9];
     Vec gravity; /* body axes */
-    Corner corner[CORNERS];
-    Contact contact[CORNERS];
-    Tyre tyre[CORNERS];
-    double spring_force[CORNERS], damper_force[CORNERS]; /* on the travel, positive in compression */
-    double axle_torque[CORNERS];                         /* half-shaft on the wheel */
-    double brake_reaction[CORNERS];                      /* brake on the wheel */
-    Vec force[CORNERS], moment[CORNERS];                 /* on carrier and wheel, at the wheel centre */
-    double axial_moment[CORNERS];                        /* the tyre's moment about the wheel axis */
-    Vec body_force, body_moment;                         /* on the sprung body, about the reference point */
-    Vec acceleration, angular_acceleration;              /* of the body, inertial, in body axes */
-    double travel_acceleration[CORNERS];
-    double rack_rate, compliance_rate[CORNERS];
+    Corners corner;
+    Contact contact;
+    Tyre tyre;
+    Four spring_force, damper_force;        /* on the travel, positive in compression */
+    Vec4 force, moment;                     /* on carrier and wheel, at the wheel centre */
+    Four axial_moment;                      /* the tyre's moment about the wheel axis */
+    Vec body_force, body_moment;            /* on the sprung body, about the reference point */
+    Vec acceleration, angular_acceleration; /* of the body, inertial, in body axes */
+    Four travel_acceleration;
+    double rack_rate;
+    Four compliance_rate;
 } Work;
 
-/* vehicle.c */
+/* derivative.c */
 void vehicle_derivative(const Variables *p, const Vehicle *c, Memory *m, const State *x, Work *w, State *dx);
+void vehicle_integrate(const Variables *p, const Vehicle *c, Memory *m, double h, int steps, Work *w);
 /* parameters.c */
 ModelStatus vehicle_constants(Model *m, Vehicle *c);
-/* suspension.c */
-void corner_kinematics(const Variables *p, const Vehicle *c, const State *x, int i, Corner *k);
-void corner_steer(const Variables *p, const Vehicle *c, const State *x, int i, Corner *k);
-void suspension_forces(const Variables *p, const Vehicle *c, const State *x, Work *w);
-double suspension_energy(const Variables *p, const Vehicle *c, const State *x);
-/* steering.c */
-double ackermann(const Variables *p, const Vehicle *c, double rack, int i, double *gradient);
-void steering_rates(const Variables *p, const Vehicle *c, const State *x, double hand_wheel, Work *w);
-/* contact.c */
-void contact_patch(const Variables *p, const Vehicle *c, const State *x, Work *w, int *hint, int i);
-/* tyre.c */
-void tyre_forces(const Variables *p, const Vehicle *c, const State *x, Work *w, int i);
-double tyre_relaxation_y(const Variables *p, double Fz, double radius);
-double tyre_rolling_radius(const Variables *p, double Fz, double radius);
-/* powertrain.c */
-void powertrain(const Variables *p, const Vehicle *c, const State *x, Work *w, State *dx);
-double brake_demand(const Variables *p, const Vehicle *c, int i);
-/* multibody.c */
-void multibody_accelerations(const Variables *p, const Vehicle *c, const State *x, Work *w);
-double kinetic_energy(const Variables *p, const Vehicle *c, const State *x, const Work *w);
 /* equilibrium.c */
 ModelStatus equilibrium(Model *m, const Vehicle *c, Memory *memory);
 /* outputs.c */

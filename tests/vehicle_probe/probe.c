@@ -1,11 +1,13 @@
 /* The plant's parts one at a time, for the tests: plain doubles in, plain doubles out. Linked with the vehicle's own
- * sources; tyre.c is included, because its Magic Formula is private to it. */
+ * sources, whose parts are headers. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "table.h"
-#include "tyre.c"
+#include "multibody.h"
+#include "suspension.h"
+#include "tyre.h"
 
 typedef struct {
     Model model;
@@ -61,43 +63,50 @@ typedef struct {
     Vec r[CORNERS], v[CORNERS], rate[CORNERS], axle[CORNERS];
 } Response;
 
+static Vec4 corners(const Vec a[CORNERS]) {
+    return vec4((Four){a[0].x, a[1].x, a[2].x, a[3].x}, (Four){a[0].y, a[1].y, a[2].y, a[3].y}, (Four){a[0].z, a[1].z, a[2].z, a[3].z});
+}
+
 void probe_multibody(const Plant *plant, const Motion *in, Response *out) {
     State x;
     Work w;
     memset(&x, 0, sizeof x);
     memset(&w, 0, sizeof w);
     memcpy(x.quaternion, in->quaternion, sizeof x.quaternion);
-    memcpy(x.travel, in->travel, sizeof x.travel);
-    memcpy(x.travel_rate, in->travel_rate, sizeof x.travel_rate);
-    memcpy(x.spin, in->spin, sizeof x.spin);
-    memcpy(x.compliance, in->compliance, sizeof x.compliance);
+    x.travel = FOUR(in->travel), x.travel_rate = FOUR(in->travel_rate);
+    x.spin = FOUR(in->spin), x.compliance = FOUR(in->compliance);
     x.velocity = in->velocity, x.rate = in->rate, x.rack = in->rack;
     rotation(x.quaternion, w.R);
     w.gravity = to_body(w.R, vec(0, 0, -plant->model.v.Env_Gravity));
     w.body_force = in->body_force, w.body_moment = in->body_moment;
+    Corners *k = &w.corner;
+    corner_kinematics(&plant->model.v, &plant->vehicle, &x, k);
+    k->steer_rate = FOUR(in->steer_rate);
+    k->rate = axpy(k->steer_rate, k->kingpin, k->rate);
+    w.force = corners(in->force), w.moment = corners(in->moment);
+    w.spring_force = FOUR(in->spring_force), w.damper_force = FOUR(in->damper_force);
     for (int i = 0; i < CORNERS; ++i) {
-        Corner *k = &w.corner[i];
-        corner_kinematics(&plant->model.v, &plant->vehicle, &x, i, k);
-        k->steer_rate = in->steer_rate[i];
-        k->rate = axpy(k->steer_rate, k->kingpin, k->rate);
-        w.force[i] = in->force[i], w.moment[i] = in->moment[i];
-        w.spring_force[i] = in->spring_force[i], w.damper_force[i] = in->damper_force[i];
-        out->r[i] = k->r, out->v[i] = k->v, out->rate[i] = k->rate, out->axle[i] = k->axle;
+        out->r[i] = corner_of(k->r, i), out->v[i] = corner_of(k->v, i);
+        out->rate[i] = corner_of(k->rate, i), out->axle[i] = corner_of(k->axle, i);
     }
     out->kinetic_energy = kinetic_energy(&plant->model.v, &plant->vehicle, &x, &w);
     multibody_accelerations(&plant->model.v, &plant->vehicle, &x, &w);
     out->acceleration = w.acceleration, out->angular_acceleration = w.angular_acceleration;
-    memcpy(out->travel_acceleration, w.travel_acceleration, sizeof out->travel_acceleration);
+    memcpy(out->travel_acceleration, &w.travel_acceleration, sizeof out->travel_acceleration);
 }
 
 /* out: Fx, Fy, Mz, peak_x, peak_y */
 void probe_magic_formula(const Plant *plant, double Fz, double kappa, double tan_alpha, double gamma, double side, double out[5]) {
-    const Forces f = magic_formula(&plant->model.v, Fz, kappa, tan_alpha, gamma, side);
-    out[0] = f.Fx, out[1] = f.Fy, out[2] = f.Mz, out[3] = f.peak_x, out[4] = f.peak_y;
+    const Forces f = magic_formula(&plant->model.v, splat(Fz), splat(kappa), splat(tan_alpha), splat(gamma), splat(side));
+    out[0] = f.Fx[0], out[1] = f.Fy[0], out[2] = f.Mz[0], out[3] = f.peak_x[0], out[4] = f.peak_y[0];
 }
 
-double probe_relaxation_y(const Plant *plant, double Fz, double radius) { return tyre_relaxation_y(&plant->model.v, Fz, radius); }
-double probe_rolling_radius(const Plant *plant, double Fz, double radius) { return tyre_rolling_radius(&plant->model.v, Fz, radius); }
+double probe_relaxation_y(const Plant *plant, double Fz, double radius) {
+    return tyre_relaxation_y(&plant->model.v, splat(Fz), splat(radius))[0];
+}
+double probe_rolling_radius(const Plant *plant, double Fz, double radius) {
+    return tyre_rolling_radius(&plant->model.v, splat(Fz), splat(radius))[0];
+}
 
 typedef struct {
     double deflection, deflection_rate, sine_inclination, spin, stretch_x, stretch_y;
@@ -114,23 +123,32 @@ void probe_tyre(const Plant *plant, const Rolling *in, int corner, Grip *out) {
     Work w;
     memset(&x, 0, sizeof x);
     memset(&w, 0, sizeof w);
-    x.spin[corner] = in->spin, x.stretch_x[corner] = in->stretch_x, x.stretch_y[corner] = in->stretch_y;
-    Contact *t = &w.contact[corner];
-    t->forward = vec(1, 0, 0), t->left = vec(0, 1, 0), t->normal = vec(0, 0, 1);
-    t->deflection = in->deflection, t->deflection_rate = in->deflection_rate;
-    t->sine_inclination = in->sine_inclination;
-    t->loaded_radius = plant->vehicle.radius[corner] - in->deflection;
-    t->arm = vec(0, 0, -t->loaded_radius);
-    w.corner[corner].v = in->velocity;
-    tyre_forces(&plant->model.v, &plant->vehicle, &x, &w, corner);
-    const Tyre *y = &w.tyre[corner];
-    const Forces f = magic_formula(&plant->model.v, y->Fz, y->slip_x, y->slip_y, in->sine_inclination, plant->vehicle.side[corner]);
-    *out = (Grip){y->Fx, y->Fy, y->Fz, y->Mz, y->My, y->slip_x, y->slip_y, y->stretch_x_rate, y->stretch_y_rate,
-                  y->dissipation, y->Fz > 0 ? f.peak_x : 0, y->Fz > 0 ? f.peak_y : 0};
+    x.spin = splat(in->spin), x.stretch_x = splat(in->stretch_x), x.stretch_y = splat(in->stretch_y);
+    Contact *t = &w.contact;
+    t->forward = spread(vec(1, 0, 0)), t->left = spread(vec(0, 1, 0)), t->normal = spread(vec(0, 0, 1));
+    t->deflection = splat(in->deflection), t->deflection_rate = splat(in->deflection_rate);
+    t->sine_inclination = splat(in->sine_inclination);
+    t->loaded_radius = plant->vehicle.radius - in->deflection;
+    t->arm = vec4(splat(0.0), splat(0.0), -t->loaded_radius);
+    w.corner.v = spread(in->velocity);
+    tyre_forces(&plant->model.v, &plant->vehicle, &x, &w);
+    const Tyre *y = &w.tyre;
+    const int i = corner, touches = y->Fz[i] > 0;
+    const Forces f = magic_formula(&plant->model.v, y->Fz, y->slip_x, y->slip_y, t->sine_inclination, plant->vehicle.side);
+    *out = (Grip){y->Fx[i], y->Fy[i], y->Fz[i], y->Mz[i], y->My[i], y->slip_x[i], y->slip_y[i], y->stretch_x_rate[i],
+                  y->stretch_y_rate[i], y->dissipation[i], touches ? f.peak_x[i] : 0, touches ? f.peak_y[i] : 0};
 }
 
 /* which: 0 passive, 1 soft, 2 hard */
 double probe_damper(const Plant *plant, int which, double velocity) {
     const Curve *curves[] = {&plant->vehicle.passive, &plant->vehicle.soft, &plant->vehicle.hard};
-    return curve_value(curves[which], velocity);
+    return curve_values(curves[which], splat(velocity))[0];
+}
+
+/* which: 0 sine, 1 cosine, 2 arctangent, 3 exponential */
+void probe_elementary(int which, int n, const double x[], double out[]) {
+    for (int k = 0; k < n; ++k) {
+        const Four a = splat(x[k]), y = which == 0 ? sine(a) : which == 1 ? cosine(a) : which == 2 ? arctangent(a) : exponential(a);
+        out[k] = y[k & 3];
+    }
 }
