@@ -52,10 +52,10 @@ INLINE void contact_patches(const Variables *p, const Vehicle *c, const State *x
         n = unit4(vec4(patch.slope_left * fy - patch.slope_forward * fx, -patch.slope_forward * fy - patch.slope_left * fx, splat(1.0)));
     }
     t->normal = to_body(R, n);
-    t->forward = unit4(cross(k->axle, t->normal));
-    t->left = cross(t->normal, t->forward);
     t->sine_inclination = dot(k->axle, t->normal);
     const Four per_cosine = 1 / root(1 - t->sine_inclination * t->sine_inclination);
+    t->forward = scale(per_cosine, cross(k->axle, t->normal));
+    t->left = cross(t->normal, t->forward);
     t->loaded_radius = (hub.z - t->height) * n.z * per_cosine;
     t->deflection = c->radius - t->loaded_radius;
     t->deflection_rate = -dot(k->v, t->normal);

@@ -61,7 +61,7 @@ INLINE void kinematic_rates(const State *x, const Work *w, State *dx) {
 INLINE void lag_rates(const Variables *p, const State *x, const Work *w, State *dx) {
     dx->stretch_x = w->tyre.stretch_x_rate;
     dx->stretch_y = w->tyre.stretch_y_rate;
-    dx->valve = (FOUR(p->Car_SuspControl_Damper_CtrlOut) - x->valve) / p->Damp_ValveLag;
+    dx->valve = (FOUR(p->Car_SuspControl_Damper_CtrlOut) - x->valve) * (1 / p->Damp_ValveLag);
     dx->compliance = w->compliance_rate;
     dx->rack = w->rack_rate;
     dx->dissipated += sum(w->tyre.dissipation - w->damper_force * x->travel_rate);
@@ -104,7 +104,7 @@ INLINE void settle(const Variables *p, State *x) {
     double *q = x->quaternion;
     const double per_length = 1 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (int j = 0; j < 4; ++j) q[j] *= per_length;
-    const Four slip = larger(x->brake_torque, splat(0.0)) / p->Brake_Stiffness;
+    const Four slip = larger(x->brake_torque, splat(0.0)) * (1 / p->Brake_Stiffness);
     x->brake_windup = within(x->brake_windup, -slip, slip);
 }
 

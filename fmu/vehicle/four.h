@@ -27,24 +27,46 @@ INLINE Four smaller(Four a, Four b) { return choose(a < b, a, b); }
 INLINE Four larger(Four a, Four b) { return choose(a > b, a, b); }
 INLINE Four within(Four x, Four low, Four high) { return smaller(larger(x, low), high); }
 INLINE Four magnitude(Four x) { return (Four)((Mask)x & ~(Mask)splat(-0.0)); }
-INLINE Four with_sign_of(Four size, Four sign) {
-    return (Four)((Mask)magnitude(size) | ((Mask)sign & (Mask)splat(-0.0)));
-}
+INLINE Four with_sign_of(Four size, Four sign) { return (Four)((Mask)size | ((Mask)sign & (Mask)splat(-0.0))); } /* size >= 0 */
 INLINE Four root(Four x) { return (Four){sqrt(x[0]), sqrt(x[1]), sqrt(x[2]), sqrt(x[3])}; }
+INLINE Four if_so(Mask m, Four yes) { return (Four)(m & (Mask)yes); } /* else 0 */
+
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define HAS_SHUFFLE
+#endif
+#endif
+#ifdef HAS_SHUFFLE
+#define SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
+#else
+#define PICK(a, b, i) ((i) < 4 ? (a)[(i) & 3] : (b)[(i) & 3])
+#define SHUFFLE(a, b, i, j, k, l) ((Four){PICK(a, b, i), PICK(a, b, j), PICK(a, b, k), PICK(a, b, l)})
+#endif
+
+/* Over the lanes: (x0 + x1) + (x2 + x3), of four Fours at a time. */
+INLINE Four sums(Four a, Four b, Four c, Four d) {
+    const Four ab = SHUFFLE(a, b, 0, 4, 2, 6) + SHUFFLE(a, b, 1, 5, 3, 7);
+    const Four cd = SHUFFLE(c, d, 0, 4, 2, 6) + SHUFFLE(c, d, 1, 5, 3, 7);
+    return SHUFFLE(ab, cd, 0, 1, 4, 5) + SHUFFLE(ab, cd, 2, 3, 6, 7);
+}
 INLINE double sum(Four x) { return (x[0] + x[1]) + (x[2] + x[3]); }
 
+/* Of (s - 1) / (s + 1) between the tangents of 1/8 and 3/8 pi, of -1 / s beyond; below, where slips mostly are, no
+ * division is needed. */
 INLINE Four arctangent(Four x) {
-    const Four size = magnitude(x);
-    const Mask steep = size > 0.41421356237309503, upright = size > 2.414213562373095; /* tan of 1/8 and 3/8 pi */
-    const Four t = choose(upright, splat(-1.0), choose(steep, size - 1.0, size)) /
-                   choose(upright, size, choose(steep, size + 1.0, splat(1.0)));
-    const Four turned = choose(upright, splat(1.5707963267948966), choose(steep, splat(0.7853981633974483), splat(0.0)));
-    const Four rest = choose(upright, splat(6.123233995736766e-17), choose(steep, splat(3.061616997868383e-17), splat(0.0)));
-    const Four z = t * t, zz = z * z, z4 = zz * zz;
+    Four s = magnitude(x), turned = splat(0.0);
+    const Mask steep = s > 0.41421356237309503;
+    if (any(steep)) {
+        const Mask upright = s > 2.414213562373095;
+        const Four one = splat(1.0), eighth = splat(0.7853981633974483);
+        turned = if_so(steep, eighth) + if_so(upright, eighth);
+        s = ((Four)(~upright & (Mask)s) - if_so(steep, one)) / (if_so(steep, s) + (Four)(~upright & (Mask)one));
+    }
+    const Four z = s * s, zz = z * z, z4 = zz * zz;
     const Four a = (-0.3333333333333333 + z * 0.1999999999999552) + zz * (-0.14285714284666542 + z * 0.11111111015256361);
     const Four b = (-0.09090904578123903 + z * 0.07692183190826087) + zz * (-0.06664511447381948 + z * 0.0585814891280221);
     const Four c = -0.0508544973794026 + z * 0.03923165829558719 + zz * -0.01917688711906226;
-    return with_sign_of(turned + (t + (rest + t * z * (a + z4 * (b + z4 * c)))), x);
+    return with_sign_of(turned + (s + s * z * (a + z4 * (b + z4 * c))), x);
 }
 
 /* sin(r + half_turns * pi) for |r| <= pi / 2 and whole half_turns, which come with a large number added to them: their
@@ -68,6 +90,17 @@ INLINE Four sine(Four x) {
 INLINE Four cosine(Four x) { /* sin(x + pi / 2) */
     const Four counted = (x * PER_PI + 0.5) + ROUNDER, n = counted - ROUNDER, half = n - 0.5;
     return sine_of_reduced((x - half * PI_HIGH) - half * PI_LOW, counted);
+}
+
+/* Of the mostly small kinematic angles: Taylor series to 1e-16 up to 0.2 rad. */
+INLINE void sine_and_cosine(Four x, Four *s, Four *c) {
+    if (any(magnitude(x) > 0.2)) {
+        *s = sine(x), *c = cosine(x);
+        return;
+    }
+    const Four z = x * x;
+    *s = x + x * z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800)))));
+    *c = 1 + z * (-0.5 + z * (1.0 / 24 + z * (-1.0 / 720 + z * (1.0 / 40320 + z * (-1.0 / 3628800)))));
 }
 
 /* |x| below 700 */

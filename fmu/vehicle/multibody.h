@@ -61,8 +61,9 @@ INLINE Symmetric inverse(const Symmetric *a) {
 
 /* What elimination of the travels leaves of a block: the sum over the corners of a b' / inertia. */
 INLINE Symmetric eliminated(Vec4 a, Vec4 a_share) {
-    return (Symmetric){sum(a.x * a_share.x), sum(a.y * a_share.y), sum(a.z * a_share.z),
-                       sum(a.x * a_share.y), sum(a.x * a_share.z), sum(a.y * a_share.z)};
+    const Vec diagonal = total(vec4(a.x * a_share.x, a.y * a_share.y, a.z * a_share.z));
+    const Vec beside = total(vec4(a.x * a_share.y, a.x * a_share.z, a.y * a_share.z));
+    return (Symmetric){diagonal.x, diagonal.y, diagonal.z, beside.x, beside.y, beside.z};
 }
 
 INLINE void multibody_accelerations(const Variables *p, const Vehicle *c, const State *x, Work *w) {
@@ -81,16 +82,17 @@ INLINE void multibody_accelerations(const Variables *p, const Vehicle *c, const 
     Symmetric A = eliminated(row.linear, linear_share), C = eliminated(row.angular, angular_share);
     A = (Symmetric){whole - A.xx, whole - A.yy, whole - A.zz, -A.xy, -A.xz, -A.yz};
     const Four xx = r.x * r.x, yy = r.y * r.y, zz = r.z * r.z;
-    C.xx = I.x + CORNERS * across + sum(m * (yy + zz) + extra * axle.x * axle.x) - C.xx;
-    C.yy = I.y + CORNERS * across + sum(m * (xx + zz) + extra * axle.y * axle.y) - C.yy;
-    C.zz = I.z + CORNERS * across + sum(m * (xx + yy) + extra * axle.z * axle.z) - C.zz;
-    C.xy = sum(extra * axle.x * axle.y - m * r.x * r.y) - C.xy;
-    C.xz = sum(extra * axle.x * axle.z - m * r.x * r.z) - C.xz;
-    C.yz = sum(extra * axle.y * axle.z - m * r.y * r.z) - C.yz;
-    const Vec4 l = linear_share, a = row.angular;
-    const Rows3 B = {{-sum(a.x * l.x), -first.z - sum(a.x * l.y), first.y - sum(a.x * l.z)},
-                     {first.z - sum(a.y * l.x), -sum(a.y * l.y), -first.x - sum(a.y * l.z)},
-                     {-first.y - sum(a.z * l.x), first.x - sum(a.z * l.y), -sum(a.z * l.z)}};
+    const Vec around = total(vec4(m * (yy + zz) + extra * axle.x * axle.x, m * (xx + zz) + extra * axle.y * axle.y,
+                                  m * (xx + yy) + extra * axle.z * axle.z));
+    const Vec product = total(vec4(extra * axle.x * axle.y - m * r.x * r.y, extra * axle.x * axle.z - m * r.x * r.z,
+                                   extra * axle.y * axle.z - m * r.y * r.z));
+    C = (Symmetric){I.x + CORNERS * across + around.x - C.xx, I.y + CORNERS * across + around.y - C.yy,
+                    I.z + CORNERS * across + around.z - C.zz, product.x - C.xy, product.y - C.xz, product.z - C.yz};
+    const Vec coupled_x = total(scale(row.angular.x, linear_share)), coupled_y = total(scale(row.angular.y, linear_share));
+    const Vec coupled_z = total(scale(row.angular.z, linear_share));
+    const Rows3 B = {{-coupled_x.x, -first.z - coupled_x.y, first.y - coupled_x.z},
+                     {first.z - coupled_y.x, -coupled_y.y, -first.x - coupled_y.z},
+                     {-first.y - coupled_z.x, first.x - coupled_z.y, -coupled_z.z}};
     const Vec f = sub(w->body_force, total(scale(row.force, linear_share)));
     const Vec n = sub(w->body_moment, total(scale(row.force, angular_share)));
 

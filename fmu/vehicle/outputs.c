@@ -31,11 +31,10 @@ static void body_outputs(Variables *v, const Vehicle *c, const State *x, const W
 
 static void store(double target[CORNERS], Four values) { *(Four *)target = values; }
 
-static Four each(double (*function)(double), Four x) { return (Four){function(x[FL]), function(x[FR]), function(x[RL]), function(x[RR])}; }
-
 static void corner_outputs(Variables *v, const State *x, const Work *w) {
     const Corners *k = &w->corner;
     const Tyre *t = &w->tyre;
+    const Four inclination = w->contact.sine_inclination;
     const Four spin = x->spin - dot(k->rate, k->axle), ratio = FOUR(v->Damp_MotionRatio);
     store(v->Car_SteerAngle, k->steer);
     store(v->Car_WheelSpd, spin);
@@ -49,9 +48,9 @@ static void corner_outputs(Variables *v, const State *x, const Work *w) {
     store(v->Car_PaperRelVel, v->Car_vx * sin(v->Body_PaperTilt) - x->travel_rate);
     store(v->Car_Fx, t->Fx), store(v->Car_Fy, t->Fy), store(v->Car_Fz, t->Fz);
     store(v->Car_LongSlip, t->slip_x);
-    store(v->Car_SlipAngle, each(atan, t->slip_y));
+    store(v->Car_SlipAngle, arctangent(t->slip_y));
     store(v->Car_GripShare, t->grip_share);
-    store(v->Car_Camber, each(asin, within(w->contact.sine_inclination, splat(-1.0), splat(1.0))));
+    store(v->Car_Camber, arctangent(inclination / root(1 - inclination * inclination)));
     store(v->Car_zRoad, w->contact.height);
     store(v->PT_Motor_Trq, x->motor_torque);
     store(v->Brake_Trq, x->brake_torque);

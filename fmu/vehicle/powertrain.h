@@ -8,7 +8,7 @@
  * production controller has an estimate. */
 INLINE Four slip_share(const Variables *p, Four slip) {
     if (!p->SlipControl_Active) return splat(1.0);
-    return 1 - within((slip - p->SlipControl_Start) / (p->SlipControl_End - p->SlipControl_Start), splat(0.0), splat(1.0));
+    return 1 - within((slip - p->SlipControl_Start) * (1 / (p->SlipControl_End - p->SlipControl_Start)), splat(0.0), splat(1.0));
 }
 
 INLINE Four brake_demand(const Variables *p, const Vehicle *c) { return p->DM_Brake * p->Brake_MaxTorque * c->brake_share; }
@@ -24,8 +24,8 @@ INLINE void powertrain(const Variables *p, const Vehicle *c, const State *x, Wor
     const Four slack = x->motor_speed - shaft_speed;
     const Four shaft = FOUR(p->PT_ShaftStiffness) * x->windup + p->PT_ShaftDamping * slack;
     const Four geared = p->PT_GearRatio * x->motor_torque;
-    dx->motor_torque = (demand - x->motor_torque) / p->PT_TorqueLag;
-    dx->motor_speed = (geared - shaft) / (p->PT_RotorInertia * p->PT_GearRatio * p->PT_GearRatio);
+    dx->motor_torque = (demand - x->motor_torque) * (1 / p->PT_TorqueLag);
+    dx->motor_speed = (geared - shaft) * (1 / (p->PT_RotorInertia * p->PT_GearRatio * p->PT_GearRatio));
     dx->windup = slack;
 
     /* Coulomb friction with an elastic stick phase: a wheel that stands does not creep. Slip control lets go of
@@ -33,14 +33,14 @@ INLINE void powertrain(const Variables *p, const Vehicle *c, const State *x, Wor
     const Mask rolls = magnitude(dot(w->corner.v, w->contact.forward)) > 2.0;
     const Four slip = choose(rolls, -w->tyre.slip_x, splat(0.0)), capacity = x->brake_torque;
     const Four brake = within(p->Brake_Stiffness * x->brake_windup + p->Brake_Damping * brake_speed, -capacity, capacity);
-    dx->brake_torque = (brake_demand(p, c) * slip_share(p, slip) - capacity) / p->Brake_Lag;
+    dx->brake_torque = (brake_demand(p, c) * slip_share(p, slip) - capacity) * (1 / p->Brake_Lag);
     dx->brake_windup = brake_speed;
 
-    dx->spin = (shaft - brake + w->axial_moment) / p->Wheel_Inertia;
+    dx->spin = (shaft - brake + w->axial_moment) * (1 / p->Wheel_Inertia);
     dx->angle = brake_speed;
     w->moment = axpy(brake, axle, w->moment);
     /* Reactions: half-shaft on the body; motor housing against the rotor's angular acceleration. */
-    w->body_moment = add(w->body_moment, total(scale(-shaft - (geared - shaft) / p->PT_GearRatio, axle)));
+    w->body_moment = add(w->body_moment, total(scale(-shaft - (geared - shaft) * (1 / p->PT_GearRatio), axle)));
     dx->dissipated += sum(brake * brake_speed + p->PT_ShaftDamping * slack * slack);
     dx->supplied = sum(geared * x->motor_speed);
 }

@@ -35,8 +35,8 @@ void road_free(Road *road)
         return;
     free(road->node);
     free(road->grid);
+    free(road->surface);
     free(road->v);
-    free(road->inverse_dv);
     free(road->cell);
     free(road);
 }

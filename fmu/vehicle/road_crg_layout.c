@@ -111,6 +111,7 @@ static void derive_line(const Road *road)
         node[i].tx = dx / size;
         node[i].ty = dy / size;
         node[i].heading = atan2(dy, dx);
+        node[i].inverse_length = i < n - 1 ? 1.0 / hypot(b->x - node[i].x, b->y - node[i].y) : 0.0;
         if (i > 0) {
             double turn = node[i].heading - node[i - 1].heading;
             node[i].heading -= full_turn * floor(turn / full_turn + 0.5);
@@ -252,15 +253,12 @@ static bool make_columns(Road *road, CrgFile *file)
     double width = given_or(file->mods[SCALE_WIDTH], 1.0), narrowest = INFINITY, span;
 
     road->v = malloc((size_t)m * sizeof *road->v);
-    road->inverse_dv = malloc((size_t)m * sizeof *road->inverse_dv);
-    if (!road->v || !road->inverse_dv)
+    if (!road->v)
         return crg_fail(file, "not enough memory for %d columns.", m);
     for (int j = 0; j < m; ++j)
         road->v[j] = width * file->column[j].v;
-    for (int j = 0; j < m - 1; ++j) {
+    for (int j = 0; j < m - 1; ++j)
         narrowest = fmin(narrowest, road->v[j + 1] - road->v[j]);
-        road->inverse_dv[j] = 1.0 / (road->v[j + 1] - road->v[j]);
-    }
     span = road->v[m - 1] - road->v[0];
     if (!(2.0 * span / narrowest < MOST_V_CELLS))
         return crg_fail(file, "two columns lie %g m apart in a road %g m wide; drop one.", narrowest, span);
@@ -272,9 +270,22 @@ static bool make_columns(Road *road, CrgFile *file)
     for (int k = 0, j = 0; k < road->cells; ++k) {
         while (j < m - 2 && (road->v[j + 1] - road->v[0]) * road->inverse_cell <= k)
             ++j;
-        road->cell[k] = j;
+        bool last = j == m - 2;
+        road->cell[k] = (Cell){last ? INFINITY : road->v[j + 1], j, road->v[j], 1.0 / (road->v[j + 1] - road->v[j]),
+                               last ? 0.0 : 1.0 / (road->v[j + 2] - road->v[j + 1]), 0.0};
     }
     return true;
+}
+
+static void lay_surface(const Road *road)
+{
+    const int m = road->columns;
+
+    for (int i = 0; i < road->rows; ++i)
+        for (int j = 0; j < m; ++j) {
+            size_t at = (size_t)i * (size_t)m + (size_t)j;
+            road->surface[at] = road->node[i].z + road->v[j] * road->node[i].banking + (double)road->grid[at];
+        }
 }
 
 static bool check_mods(CrgFile *file)
@@ -307,7 +318,8 @@ bool crg_layout(Road *road, CrgFile *file)
     road->grid = file->grid;
     file->grid = NULL;
     road->node = calloc((size_t)road->rows, sizeof *road->node);
-    if (!road->node)
+    road->surface = malloc((size_t)road->rows * (size_t)road->columns * sizeof *road->surface);
+    if (!road->node || !road->surface)
         return crg_fail(file, "not enough memory for %d cross sections.", road->rows);
     if (!make_columns(road, file))
         return false;
@@ -322,10 +334,14 @@ bool crg_layout(Road *road, CrgFile *file)
     if (!check_line(road, file))
         return false;
     derive_line(road);
+    lay_surface(road);
     move_road(road, file);
     if (!check_line(road, file))
         return false;
     derive_line(road);
+    lay_surface(road);
+    free(road->grid);
+    road->grid = NULL;
     memcpy(road->notes, file->notes, sizeof road->notes);
     return true;
 }

@@ -6,8 +6,7 @@
 #include "four.h"
 #include "road_crg_layout.h"
 
-typedef int Index4 __attribute__((vector_size(16)));
-typedef float Float4 __attribute__((vector_size(16)));
+typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
 
 typedef struct { Four u, v, tx, ty, stretch, share; } RoadPoints; /* as in RoadPosition; share of the way along the segment */
 
@@ -71,7 +70,7 @@ INLINE void road_points(const Road *road, const int segment[4], Four x, Four y, 
     const Four tx = atx + share * (btx - atx), ty = aty + share * (bty - aty), length = 1.0 / root(tx * tx + ty * ty);
     out->share = share;
     out->u = road->u_first + (index + share) * road->du;
-    out->v = ((y - ay) * dx - (x - ax) * dy) / root(dx * dx + dy * dy);
+    out->v = ((y - ay) * dx - (x - ax) * dy) * OF_A(inverse_length);
     out->tx = tx * length;
     out->ty = ty * length;
     out->stretch = 1.0 / larger(1.0 - (curvature + share * (OF_B(curvature) - curvature)) * out->v, splat(closest_to_centre));
@@ -86,38 +85,51 @@ INLINE void road_points(const Road *road, const int segment[4], Four x, Four y, 
     }
 }
 
+typedef struct { Four first, second; } Pairs;
+
+/* Two neighbouring doubles at each of four places, turned into two Fours. */
+INLINE Pairs load_pairs(const double *a, const double *b, const double *c, const double *d)
+{
+#ifdef HAS_SHUFFLE
+    const Four ac = SHUFFLE(*(const Two *)a, *(const Two *)c, 0, 1, 2, 3), bd = SHUFFLE(*(const Two *)b, *(const Two *)d, 0, 1, 2, 3);
+    return (Pairs){SHUFFLE(ac, bd, 0, 4, 2, 6), SHUFFLE(ac, bd, 1, 5, 3, 7)};
+#else
+    return (Pairs){{a[0], b[0], c[0], d[0]}, {a[1], b[1], c[1], d[1]}};
+#endif
+}
+
+/* Whole numbers from 0 on, as array indices. */
+INLINE void indices(Four whole, long long index[4])
+{
+    const Mask bits = (Mask)(whole + 4503599627370496.0) & 0xfffffffffffff; /* 2^52: the mantissa is the number */
+    for (int k = 0; k < 4; ++k)
+        index[k] = bits[k];
+}
+
+/* Rounded down, but a whole number may also count as the end of the interval below. */
+INLINE Four interval(Four place, double last) { return smaller(place - 0.5, splat(last)) + ROUNDER - ROUNDER; }
+
 /* Inertial z of the surface; what is not a number counts as the road's start or right-hand edge. */
 INLINE Four road_elevations(const Road *road, Four u, Four v)
 {
-    const int last = road->columns - 1;
     const Four place = within((u - road->u_first) * road->inverse_du, splat(0.0), splat(road->rows - 1));
-    Index4 i = __builtin_convertvector(place, Index4), j;
-    i += i > road->rows - 2; /* the road's very end belongs to its last segment */
-    const Four share = place - __builtin_convertvector(i, Four);
-    v = within(v, splat(road->v[0]), splat(road->v[last]));
-    const Index4 cell = __builtin_convertvector((v - road->v[0]) * road->inverse_cell, Index4);
-    for (int k = 0; k < 4; ++k) {
-        const int column = road->cell[cell[k]];
-        j[k] = column + ((v[k] >= road->v[column + 1]) & (column < last - 1)); /* a cell spans one edge at most */
-    }
-    const double *e = road->v, *per = road->inverse_dv;
-    const Four across = (v - (Four){e[j[0]], e[j[1]], e[j[2]], e[j[3]]}) * (Four){per[j[0]], per[j[1]], per[j[2]], per[j[3]]};
+    const Four i = interval(place, road->rows - 2), share = place - i;
+    v = within(v, splat(road->v[0]), splat(road->v[road->columns - 1]));
+    long long at[4];
+    indices(interval((v - road->v[0]) * road->inverse_cell, road->cells - 1), at);
+    const Cell *a = &road->cell[at[0]], *b = &road->cell[at[1]], *c = &road->cell[at[2]], *d = &road->cell[at[3]];
+    const Pairs ahead = load_pairs(&a->next, &b->next, &c->next, &d->next);
+    const Pairs before = load_pairs(&a->v, &b->v, &c->v, &d->v);
+    const Four inverse_next = {a->inverse_dv_next, b->inverse_dv_next, c->inverse_dv_next, d->inverse_dv_next};
+    const Mask passed = v >= ahead.first;
+    const Four left = (v - choose(passed, ahead.first, before.first)) * choose(passed, inverse_next, before.second);
 
-    const size_t columns = (size_t)road->columns;
-    const Node *n[4];
-    const float *g[4];
-    for (int k = 0; k < 4; ++k) {
-        n[k] = &road->node[i[k]];
-        g[k] = road->grid + (size_t)i[k] * columns + j[k];
-    }
-#define GRID(at) __builtin_convertvector(((Float4){g[0][at], g[1][at], g[2][at], g[3][at]}), Four)
-#define NODE(at, field) ((Four){n[0][at].field, n[1][at].field, n[2][at].field, n[3][at].field})
-    const Four here = GRID(0), there = GRID(columns), z = NODE(0, z), banking = NODE(0, banking);
-    const Four z0 = here + across * (GRID(1) - here), z1 = there + across * (GRID(columns + 1) - there);
-    const Four line = z + v * banking + share * (NODE(1, z) - z + v * (NODE(1, banking) - banking));
-#undef GRID
-#undef NODE
-    return line + z0 + share * (z1 - z0);
+    indices(i * road->columns + (ahead.second + if_so(passed, splat(1.0))), at);
+    const double *za = road->surface + at[0], *zb = road->surface + at[1], *zc = road->surface + at[2], *zd = road->surface + at[3];
+    const size_t row = (size_t)road->columns;
+    const Pairs here = load_pairs(za, zb, zc, zd), there = load_pairs(za + row, zb + row, zc + row, zd + row);
+    const Four z0 = here.first + left * (here.second - here.first), z1 = there.first + left * (there.second - there.first);
+    return z0 + share * (z1 - z0);
 }
 
 #endif

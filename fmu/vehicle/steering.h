@@ -18,7 +18,7 @@ INLINE void steering_rates(const Variables *p, const Vehicle *c, const State *x,
     const Four gradient = ackermann_gradient(c, x->rack);
     const double moment = sum(gradient * dot(k->kingpin, w->moment));
     const double demand = clamp(hand_wheel / p->Steer_Ratio, -LARGEST_RACK, LARGEST_RACK);
-    w->compliance_rate = (FOUR(p->Kin_LateralForceSteer) * w->tyre.Fy - x->compliance) / p->Kin_ComplianceLag;
+    w->compliance_rate = (FOUR(p->Kin_LateralForceSteer) * w->tyre.Fy - x->compliance) * (1 / p->Kin_ComplianceLag);
     w->rack_rate = (p->Steer_Stiffness * (demand - x->rack) + moment) / p->Steer_Damping;
     k->steer_rate = gradient * w->rack_rate + w->compliance_rate;
     k->rate = axpy(k->steer_rate, k->kingpin, k->rate);

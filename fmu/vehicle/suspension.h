@@ -25,7 +25,10 @@ INLINE void corner_kinematics(const Variables *p, const Vehicle *c, const State 
     const Four camber1 = side * (camber_slope + 2 * camber_curve * q), camber2 = side * 2 * camber_curve;
     const Four toe = toe1 * q - side * FOUR(p->Kin_Toe);
     const Four camber = side * (FOUR(p->Kin_StaticCamber) + (camber_slope + camber_curve * q) * q);
-    const Angles a = {sine(toe), cosine(toe), sine(camber), cosine(camber), sine(pitch1 * q), cosine(pitch1 * q)};
+    Angles a;
+    sine_and_cosine(toe, &a.sz, &a.cz);
+    sine_and_cosine(camber, &a.sx, &a.cx);
+    sine_and_cosine(pitch1 * q, &a.sy, &a.cy);
     const Four eyx = -a.sz * a.cx, eyy = a.cz * a.cx, eyz = a.sx; /* the axle unsteered; ex = (cz, sz, 0) */
 
     const Four recession = FOUR(p->Kin_Recession), curve = FOUR(p->Kin_RecessionCurve);
@@ -39,7 +42,9 @@ INLINE void corner_kinematics(const Variables *p, const Vehicle *c, const State 
     k->turn2 = vec4(camber2 * a.cz - camber1 * toe1 * a.sz + pitch1 * sway.x,
                     camber2 * a.sz + camber1 * toe1 * a.cz + pitch1 * sway.y, pitch1 * sway.z);
 
-    const Four steer = ackermann(c, x->rack) + x->compliance, ss = sine(steer), cs = cosine(steer);
+    const Four steer = ackermann(c, x->rack) + x->compliance;
+    Four ss, cs;
+    sine_and_cosine(steer, &ss, &cs);
     k->steer = steer;
     k->kingpin = turn_by(&a, vec4(-c->sine_caster, splat(0.0), c->cosine_caster));
     k->axle = turn_by(&a, vec4(-c->cosine_caster * ss, cs, -c->sine_caster * ss)); /* e_y turned about the kingpin */

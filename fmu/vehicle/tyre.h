@@ -20,12 +20,12 @@ INLINE Four shape(Four B, Four E, Four s) {
 INLINE Four sine_of_twice_atan(Four z) { return 2 * z / (1 + z * z); }
 
 INLINE Four tyre_relaxation_y(const Variables *p, Four Fz, Four radius) { /* PAC2002, sigma_alpha */
-    return larger(p->Tire_PTY1 * sine_of_twice_atan(Fz / (p->Tire_PTY2 * p->Tire_NominalLoad)) * radius, splat(0.05));
+    return larger(p->Tire_PTY1 * sine_of_twice_atan(Fz * (1 / (p->Tire_PTY2 * p->Tire_NominalLoad))) * radius, splat(0.05));
 }
 
 /* Effective rolling radius, as MF-Tyre has it: falls with load, much less than the loaded radius does. */
 INLINE Four tyre_rolling_radius(const Variables *p, Four Fz, Four radius) {
-    const Four load = p->Tire_LoadDependentRadius ? (Four)(Fz / p->Tire_NominalLoad) : splat(1.0);
+    const Four load = p->Tire_LoadDependentRadius ? (Four)(Fz * (1 / p->Tire_NominalLoad)) : splat(1.0);
     return radius - p->Tire_NominalLoad / p->Tire_Stiffness * (p->Tire_FREFF * load + p->Tire_DREFF * arctangent(p->Tire_BREFF * load));
 }
 
@@ -33,7 +33,7 @@ typedef struct { Four Fx, Fy, Mz, peak_x, peak_y; } Forces;
 
 INLINE Forces magic_formula(const Variables *p, Four Fz, Four kappa, Four tan_alpha, Four gamma, Four side) {
     const double Fz0 = p->Tire_NominalLoad;
-    const Four d = (Fz - Fz0) / Fz0, gamma2 = gamma * gamma, alpha = side * arctangent(tan_alpha);
+    const Four d = (Fz - Fz0) * (1 / Fz0), gamma2 = gamma * gamma, alpha = side * arctangent(tan_alpha);
     Forces f;
     gamma *= side;
 
@@ -43,7 +43,7 @@ INLINE Forces magic_formula(const Variables *p, Four Fz, Four kappa, Four tan_al
     const Four Fx0 = f.peak_x * sine(p->Tire_PCX1 * shape(Kx / (p->Tire_PCX1 * f.peak_x), Ex, kappa));
 
     f.peak_y = (p->Tire_PDY1 + p->Tire_PDY2 * d) * (1 - p->Tire_PDY3 * gamma2) * p->Tire_FrictionY * p->Road_Friction * Fz;
-    const Four Ky = p->Tire_PKY1 * Fz0 * sine_of_twice_atan(Fz / (p->Tire_PKY2 * Fz0)) * (1 - p->Tire_PKY3 * magnitude(gamma));
+    const Four Ky = p->Tire_PKY1 * Fz0 * sine_of_twice_atan(Fz * (1 / (p->Tire_PKY2 * Fz0))) * (1 - p->Tire_PKY3 * magnitude(gamma));
     const Four sign = choose(alpha < 0.0, splat(-1.0), splat(1.0));
     const Four Ey = (p->Tire_PEY1 + p->Tire_PEY2 * d) * (1 - (p->Tire_PEY3 + p->Tire_PEY4 * gamma) * sign);
     const Four Fy0 = f.peak_y * sine(p->Tire_PCY1 * shape(Ky / (p->Tire_PCY1 * f.peak_y), Ey, alpha));
@@ -75,10 +75,11 @@ INLINE Four stretch_rate(Four slip, double limit, Four V_slip, Four V_x) {
 
 /* Carcass damping may not take the pair of forces out of the friction ellipse where the formula's own do not go. */
 INLINE void stay_in_ellipse(Tyre *y, const Forces *f) {
-    const Four used_x = y->Fx / f->peak_x, used_y = y->Fy / f->peak_y, own_x = f->Fx / f->peak_x, own_y = f->Fy / f->peak_y;
+    const Four per_x = 1 / f->peak_x, per_y = 1 / f->peak_y;
+    const Four used_x = y->Fx * per_x, used_y = y->Fy * per_y, own_x = f->Fx * per_x, own_y = f->Fy * per_y;
     const Four usage = root(used_x * used_x + used_y * used_y);
     const Four most = larger(root(own_x * own_x + own_y * own_y), splat(1.0));
-    const Four kept = choose(usage > most, most / usage, splat(1.0));
+    const Four kept = smaller(most / larger(usage, splat(1.0)), splat(1.0));
     y->Fx *= kept, y->Fy *= kept;
     y->grip_share = usage * kept;
 }
@@ -95,12 +96,12 @@ INLINE void tyre_forces(const Variables *p, const Vehicle *c, const State *x, Wo
     y->rolling_radius = tyre_rolling_radius(p, on_ground(touches, Fz), c->radius);
     const Four V_x = dot(k->v, t->forward), V_sx = V_x - y->rolling_radius * x->spin;
     const Four V_sy = dot(add(k->v, cross(k->rate, t->arm)), t->left);
-    const Four slip_x = within(x->stretch_x / p->Tire_RelaxationX, splat(-MAX_SLIP_X), splat(MAX_SLIP_X));
+    const Four slip_x = within(x->stretch_x * (1 / p->Tire_RelaxationX), splat(-MAX_SLIP_X), splat(MAX_SLIP_X));
     const Four slip_y = within(-x->stretch_y / tyre_relaxation_y(p, Fz, c->radius), splat(-MAX_SLIP_Y), splat(MAX_SLIP_Y));
     const Four rate_x = stretch_rate(slip_x, MAX_SLIP_X, V_sx, V_x), rate_y = stretch_rate(-slip_y, MAX_SLIP_Y, V_sy, V_x);
 
     const Forces f = magic_formula(p, Fz, slip_x, slip_y, t->sine_inclination, c->side);
-    const Four fade = within(1 - magnitude(V_x) / p->Tire_StandstillSpeed, splat(0.0), splat(1.0));
+    const Four fade = within(1 - magnitude(V_x) * (1 / p->Tire_StandstillSpeed), splat(0.0), splat(1.0));
     const Four extra = p->Tire_StandstillDamping * fade * fade * (3 - 2 * fade);
     y->Fx = within(f.Fx + (p->Tire_CarcassDampingX + extra) * rate_x, -f.peak_x, f.peak_x);
     y->Fy = within(f.Fy + (p->Tire_CarcassDampingY + extra) * rate_y, -f.peak_y, f.peak_y);
@@ -109,7 +110,7 @@ INLINE void tyre_forces(const Variables *p, const Vehicle *c, const State *x, Wo
     y->Fz = on_ground(touches, Fz), y->Fx = on_ground(touches, y->Fx), y->Fy = on_ground(touches, y->Fy);
     y->grip_share = on_ground(touches, y->grip_share);
     y->Mz = on_ground(touches, f.Mz);
-    y->My = -p->Tire_QSY1 * c->radius * y->Fz * within(x->spin * y->rolling_radius / 0.1, splat(-1.0), splat(1.0));
+    y->My = -p->Tire_QSY1 * c->radius * y->Fz * within(x->spin * y->rolling_radius * 10, splat(-1.0), splat(1.0));
     y->slip_x = on_ground(touches, slip_x), y->slip_y = on_ground(touches, slip_y);
     y->stretch_x_rate = choose(touches, rate_x, -100 * x->stretch_x); /* off the ground the carcass recovers */
     y->stretch_y_rate = choose(touches, rate_y, -100 * x->stretch_y);

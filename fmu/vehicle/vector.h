@@ -42,7 +42,10 @@ INLINE Vec unit(Vec a) { return scale(1.0 / sqrt(dot(a, a)), a); }
 INLINE Vec4 unit4(Vec4 a) { return scale(1.0 / root(dot(a, a)), a); }
 INLINE Vec4 spread(Vec a) { return (Vec4){splat(a.x), splat(a.y), splat(a.z)}; } /* the same at every corner */
 INLINE Vec corner_of(Vec4 a, int i) { return (Vec){a.x[i], a.y[i], a.z[i]}; }
-INLINE Vec total(Vec4 a) { return (Vec){sum(a.x), sum(a.y), sum(a.z)}; }
+INLINE Vec total(Vec4 a) { /* over the corners */
+    const Four s = sums(a.x, a.y, a.z, a.z);
+    return (Vec){s[0], s[1], s[2]};
+}
 
 /* Rotation matrix of a unit quaternion (w, x, y, z). */
 INLINE void rotation(const double q[4], double R[9]) {
