@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 SOURCES = Path(__file__).parents[1] / "fmu" / "vehicle"
-FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O2"]
+FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-O2"]
 
 
 def compile_reader(target: Path, *flags: str, program: Path | None = None) -> Path:

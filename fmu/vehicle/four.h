@@ -11,6 +11,7 @@
 
 #include <math.h>
 
+#pragma GCC diagnostic ignored "-Wpsabi" /* Fours are passed to inlined functions only */
 
 
 #define INLINE static inline __attribute__((always_inline))
