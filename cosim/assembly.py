@@ -19,12 +19,13 @@ from cosim.driver import PathDriver
 from cosim.errors import InputError, NetworkError, Problem
 from cosim.fmi import Description, Value
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
+from cosim.manoeuvre import Plan, manoeuvre_of, motion_of
+from cosim.manoeuvre.programme import ProgrammedDriver
 from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, TRUTH, Quantity
 from cosim.recorder import Recorder, Signal
 from cosim.scenario.controllers import Passive
 from cosim.scenario.controllers import Skyhook as SkyhookSettings
 from cosim.scenario.schema import Scenario
-from cosim.speed_profile import STYLES, speed_profile, travel_time
 from cosim.start import builtin_start, checked_parameters
 from cosim.vehicle import RECORDED, Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
@@ -37,8 +38,8 @@ LATE: Final = 1.3  # a driver this much slower than his profile has come to grie
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a run ended. `comfort` is empty where the vehicle lacks the signals; times in s,
-    deviation in m.
+    """How a run ended. `comfort` is empty where the vehicle lacks the signals, `manoeuvre` where
+    the road was followed or the manoeuvre cut short; times in s, deviation in m.
     """
 
     steps_done: int
@@ -48,6 +49,7 @@ class RunResult:
     finish_reason: str
     comfort: Mapping[str, float]
     largest_deviation_m: float
+    manoeuvre: Mapping[str, float]
 
 
 @dataclass
@@ -58,9 +60,10 @@ class Assembly:
     files: Mapping[str, Path]
     blocks: Blocks
     vehicle: Vehicle
-    driver: PathDriver
+    driver: PathDriver | ProgrammedDriver
+    plan: Plan
     steps: int
-    if_late: str  # why the run ends where the driver has not reached the end of the road
+    if_late: str  # why the run ends where the driver has not come to the end
 
     def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
         """Run to the end of the lap or the last step, and free the FMU whatever happens."""
@@ -70,16 +73,20 @@ class Assembly:
         finally:
             self.vehicle.close()
         wall = time.perf_counter() - begin
-        reason = "end of the road" if self.driver.finished else self.if_late
+        done = self.driver.completed
         return RunResult(
             steps_done=last,
             wall_time_s=wall,
             simulated_s=last * STEP_S,
-            lap_time_s=last * STEP_S if self.driver.finished else None,
-            finish_reason=reason,
+            lap_time_s=last * STEP_S if done else None,
+            finish_reason=self.plan.end if done else self._unfinished(),
             comfort=_comfort(self.recorder),
             largest_deviation_m=self.driver.largest_deviation,
+            manoeuvre=self.plan.figures(motion_of(self.recorder)),
         )
+
+    def _unfinished(self) -> str:
+        return "the road ended before the manoeuvre" if self.driver.finished else self.if_late
 
 
 def assemble(
@@ -94,22 +101,16 @@ def assemble(
     `InputError` with everything wrong in the scenario, `FmuError` or `NetworkError` for a file that
     does not load.
     """
-    wiring, description, course = _checked(scenario)
+    wiring, description, course, plan = _checked(scenario)
     network = None
     if sensor is None:
         network = _network(scenario)
         sensor = _sensor(network)
-    style = STYLES[scenario.driver.style]
-    cap = scenario.driver.speed_kmh / 3.6 if scenario.driver.speed_kmh else None
-    speed = speed_profile(course.track, style, cap)
-    start_speed = float(speed[int(np.searchsorted(course.track.s, 0.0))])
     passive = isinstance(controller, Passive) and dampers is None
-    start = _start_values(scenario, description, course, start_speed, passive)
+    start = _start_values(scenario, description, course, plan, passive)
     initial = 0.0 if isinstance(controller, Passive) else controller.initial_command
-    expected = travel_time(course.track, speed)
-    _check_length(scenario, expected)
-    steps, if_late = _steps(scenario, expected)
-    driver = PathDriver(course.track, speed, STEP_S)
+    steps, if_late = _steps(scenario, plan)
+    driver = plan.driver(STEP_S)
     recorder = Recorder(record_groups(), steps + 1, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, initial)
     files = {"fmu": description.path, "network": network, "road": course.file}
@@ -120,6 +121,7 @@ def assemble(
         blocks=Blocks(vehicle, driver, sensor, dampers or _controller(scenario, controller)),
         vehicle=vehicle,
         driver=driver,
+        plan=plan,
         steps=steps,
         if_late=if_late,
     )
@@ -142,9 +144,9 @@ def record_groups() -> list[tuple[str, list[Signal]]]:
     ]
 
 
-def _checked(scenario: Scenario) -> tuple[Wiring, Description, Course]:
-    """Return the vehicle FMU, its wiring and the course, after all that can be wrong was looked
-    for.
+def _checked(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan]:
+    """Return the vehicle FMU, its wiring, the course and what is driven on it, after all that can
+    be wrong was looked for.
     """
     settings = scenario.vehicle
     own = settings.fmu == "builtin"
@@ -157,32 +159,46 @@ def _checked(scenario: Scenario) -> tuple[Wiring, Description, Course]:
         else mapped_wiring(description, settings.variables, scenario.problem)
     )
     problems += checked_parameters(scenario, description)
-    course = None
+    found = None
     try:
-        course = course_of(scenario)
+        found = _planned(scenario)
     except InputError as error:
         problems += error.problems
-    if course is not None and scenario.driver.speed_kmh is None and _unlimited(course):
-        sentence = f"the {course.track.name} road has no speed limit: give driver.speed_kmh"
-        problems.append(scenario.problem(("driver", "speed_kmh"), sentence))
-    if problems or course is None:
+    if problems or found is None:
         raise InputError(sorted(problems, key=_line))
-    return wiring, description, course
+    return wiring, description, *found
+
+
+def _planned(scenario: Scenario) -> tuple[Course, Plan]:
+    """Return the course and what is driven on it; raises `InputError`."""
+    manoeuvre = manoeuvre_of(scenario, STEP_S)
+    needed = manoeuvre.road_length
+    course = course_of(scenario, needed)
+    track = course.track
+    if scenario.driver.speed_kmh is None and not np.isfinite(track.speed_limit).all():
+        sentence = f"the {track.name} road has no speed limit: give driver.speed_kmh"
+        raise InputError(scenario.problem(("driver", "speed_kmh"), sentence))
+    if needed is not None and track.length < needed:
+        sentence = f"the manoeuvre needs {needed:.0f} m of road; this one has {track.length:.0f} m"
+        raise InputError(scenario.problem(("road", "length_m"), sentence))
+    try:
+        plan = manoeuvre.plan(track)
+    except ValueError as error:
+        raise InputError(scenario.problem(("manoeuvre",), str(error))) from None
+    _check_length(scenario, plan)
+    return course, plan
 
 
 def _line(problem: Problem) -> int:
     return problem.place.line if problem.place is not None else 0
 
 
-def _unlimited(course: Course) -> bool:
-    return not bool(np.isfinite(course.track.speed_limit).all())
-
-
 def _start_values(
-    scenario: Scenario, description: Description, course: Course, speed: float, passive: bool
+    scenario: Scenario, description: Description, course: Course, plan: Plan, passive: bool
 ) -> dict[str, Value]:
     """Return the start values; of ours, another FMU gets those that it has by the same names."""
-    own = builtin_start(course, speed, passive, scenario.road.friction)
+    speed = float(plan.speed[int(np.searchsorted(plan.line.s, 0.0))])
+    own = builtin_start(course, plan.line, speed, passive, scenario.road.friction)
     known = {name: value for name, value in own.items() if name in description.variables}
     return known | scenario.parameters
 
@@ -213,22 +229,24 @@ def _controller(scenario: Scenario, settings: Passive | SkyhookSettings) -> Cont
     )
 
 
-def _check_length(scenario: Scenario, expected_s: float) -> None:
+def _check_length(scenario: Scenario, plan: Plan) -> None:
     """Raise `InputError` where the road ends before the scenario's duration is over."""
-    if scenario.duration != "lap" and float(scenario.duration) > expected_s:
+    if scenario.duration == "lap" or scenario.manoeuvre is not None:
+        return
+    if float(scenario.duration) > plan.expected_s:
         sentence = (
-            f"the road ends after about {expected_s:.0f} s, before the duration of "
+            f"the road ends after about {plan.expected_s:.0f} s, before the duration of "
             f"{float(scenario.duration):g} s: give a longer road, or duration: lap"
         )
         raise InputError(scenario.problem(("duration",), sentence))
 
 
-def _steps(scenario: Scenario, expected_s: float) -> tuple[int, str]:
+def _steps(scenario: Scenario, plan: Plan) -> tuple[int, str]:
     """Return how many steps at most, and why the run ends there if the road does not end before."""
-    late = math.ceil(LATE * expected_s / STEP_S)
+    late = math.ceil(LATE * plan.expected_s / STEP_S)
     if scenario.duration != "lap" and (wanted := float(scenario.duration) / STEP_S) <= late:
         return max(round(wanted), 1), "duration reached"
-    return late, "lap not finished"
+    return late, "lap not finished" if scenario.manoeuvre is None else "manoeuvre not finished"
 
 
 def _comfort(recorder: Recorder) -> dict[str, float]:

@@ -1,6 +1,4 @@
-"""The course of a scenario: the track that the driver follows and the road file that the wheels run
-on.
-"""
+"""The course of a scenario: the track and the road file that the wheels run on."""
 
 from __future__ import annotations
 
@@ -23,8 +21,10 @@ from cosim.road import (
     load_track,
     track_of_file,
 )
+from cosim.road.circle import load_circle
 from cosim.scenario.obstacles import BumpRow, SpeedHump
 from cosim.scenario.obstacles import Obstacle as ObstacleSettings
+from cosim.scenario.road import Road
 from cosim.scenario.schema import Scenario
 from cosim.scenario.surface import CobbleSurface, IsoSurface
 
@@ -37,10 +37,13 @@ class Course:
     file: Path
 
 
-def course_of(scenario: Scenario, cache_dir: Path | None = None) -> Course:
+def course_of(
+    scenario: Scenario, length: float | None = None, cache_dir: Path | None = None
+) -> Course:
     """Return the scenario's course, its road built unless the cache has it.
 
-    Raises `InputError` with the place in the scenario for a file that is no OpenCRG road, and for
+    `length` [m] is that of a straight track whose length the scenario leaves open. Raises
+    `InputError` with the place in the scenario for a file that is no OpenCRG road, and for
     obstacles that the road cannot carry.
     """
     road = scenario.road
@@ -48,12 +51,19 @@ def course_of(scenario: Scenario, cache_dir: Path | None = None) -> Course:
         if road.file is not None:
             file = scenario.resolve(road.file).resolve()
             return Course(track_of_file(file), file)
-        track = load_track(str(road.track), road.length_m)
+        track = _track(road, length)
         obstacles = _obstacles(scenario, track.length)
         return Course(track, build_road(track, _surface(scenario), cache_dir, obstacles))
     except RoadError as error:
         key = ("road", "file") if road.file is not None else ("road",)
         raise InputError(scenario.problem(key, str(error))) from None
+
+
+def _track(road: Road, length: float | None) -> Track:
+    if road.track == "circle":
+        angle = 270.0 if road.angle_deg is None else road.angle_deg
+        return load_circle(float(road.radius_m or 0.0), angle, road.direction or "left")
+    return load_track(str(road.track), length if road.length_m is None else road.length_m)
 
 
 def _surface(scenario: Scenario) -> Surface:

@@ -66,9 +66,11 @@ class Verdict:
         return asdict(self)
 
 
-def check_metric(metric: str, labels: Sequence[str]) -> str | None:
-    """Return what is wrong with the name of a metric, or None."""
-    names = metric_names(labels)
+def check_metric(metric: str, labels: Sequence[str], manoeuvre: str | None = None) -> str | None:
+    """Return what is wrong with the name of a metric in a scenario with this kind of manoeuvre, or
+    None.
+    """
+    names = metric_names(labels, manoeuvre)
     if metric in names:
         return None
     hint = did_you_mean(metric, names)

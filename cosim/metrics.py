@@ -32,12 +32,53 @@ RUN_FIGURES: Final = (
     "real_time_factor",
     "valid_samples",
 )
+_HELD: Final = ("speed_mean_kmh", "speed_deviation_kmh", "path_deviation_m")
+_LARGEST: Final = ("path_deviation_m", "lateral_acceleration_max_m_s2", "yaw_rate_max_deg_s")
+_CHANGE: Final = ("start_speed_kmh", "time_s", "distance_m", "path_deviation_m", "yaw_change_deg")
+# By the manoeuvre's kind; what they are is told where they are computed, in cosim.manoeuvre.
+MANOEUVRE_FIGURES: Final = {
+    "constant_speed": _HELD,
+    "constant_radius": (
+        *_HELD,
+        "lateral_acceleration_m_s2",
+        "side_slip_deg",
+        "steering_wheel_deg",
+        "yaw_rate_deg_s",
+    ),
+    "double_lane_change": ("clearance_m", "entry_speed_kmh", "exit_speed_kmh", *_LARGEST),
+    "slalom": ("clearance_m", "speed_mean_kmh", "speed_deviation_kmh", *_LARGEST),
+    "sine_with_dwell": (
+        "start_speed_kmh",
+        "yaw_rate_peak_deg_s",
+        "yaw_rate_after_1_00_s_percent",
+        "yaw_rate_after_1_75_s_percent",
+        "lateral_displacement_m",
+        "lateral_acceleration_max_m_s2",
+    ),
+    "step_steer": (
+        "start_speed_kmh",
+        "steering_wheel_deg",
+        "yaw_rate_deg_s",
+        "yaw_gain_per_s",
+        "yaw_response_time_s",
+        "yaw_peak_time_s",
+        "yaw_overshoot_percent",
+        "lateral_acceleration_m_s2",
+        "lateral_acceleration_response_time_s",
+    ),
+    "brake": (*_CHANGE, "mean_deceleration_m_s2"),
+    "accelerate": (*_CHANGE, "mean_acceleration_m_s2"),
+}
 
 # A unit is read off the end of a figure's name; of two endings that fit, the first here counts.
 UNITS: Final = {
     "_m_s2": "m/s²",
     "_m_s": "m/s",
+    "_deg_s": "°/s",
+    "_per_s": "1/s",
     "_percent": "%",
+    "_deg": "°",
+    "_kmh": "km/h",
     "_s": "s",
     "_n": "N",
     "_m": "m",
@@ -54,8 +95,10 @@ def with_unit(value: float, metric: str) -> str:
     return f"{value:.4g} {unit_of(metric)}".rstrip()
 
 
-def metric_names(labels: Sequence[str] = ()) -> list[str]:
-    """Return every path that a limit may name, with those of the runs in `labels`."""
+def metric_names(labels: Sequence[str] = (), manoeuvre: str | None = None) -> list[str]:
+    """Return every path that a limit may name, with those of the runs in `labels` and of a kind of
+    manoeuvre.
+    """
     names = [*RUN_FIGURES]
     names += [f"truth.{part}.rms_m_s" for part in PARTS]
     names += [
@@ -65,6 +108,7 @@ def metric_names(labels: Sequence[str] = ()) -> list[str]:
         for figure in ERROR_FIGURES
     ]
     names += [f"comfort.{figure}" for figure in COMFORT_FIGURES]
+    names += [f"manoeuvre.{figure}" for figure in MANOEUVRE_FIGURES.get(manoeuvre or "", ())]
     return names + [f"{label}.{name}" for label in labels for name in names]
 
 

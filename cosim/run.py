@@ -63,6 +63,10 @@ class RunResult(Protocol):
     def comfort(self) -> Mapping[str, Any]:
         """Figures by name, at least those of `cosim.metrics.COMFORT_FIGURES`."""
 
+    @property
+    def manoeuvre(self) -> Mapping[str, Any]:
+        """Figures of `cosim.metrics.MANOEUVRE_FIGURES` by name; empty without a manoeuvre."""
+
 
 class Assembly(Protocol):
     """The blocks of one run, connected and ready."""
@@ -213,6 +217,7 @@ def _run(
         "real_time_factor": result.simulated_s / max(result.wall_time_s, 1e-9),
         **compare(assembly.recorder),
         "comfort": dict(result.comfort),
+        "manoeuvre": dict(result.manoeuvre),
     }
     return RunOutcome(label, assembly.recorder, figures)
 

@@ -8,6 +8,7 @@ from cosim.course import Course
 from cosim.errors import Problem
 from cosim.fmi import KINDS, Description, Value
 from cosim.quantities import INPUT_QUANTITIES
+from cosim.road import Track
 from cosim.scenario.schema import Scenario
 
 FRICTION: Final = "Road.Friction"  # an input of the built-in FMU: set once, it is held
@@ -21,12 +22,12 @@ _TAKEN: Final = {
 
 
 def builtin_start(
-    course: Course, speed: float, passive: bool, friction: float | None
+    course: Course, line: Track, speed: float, passive: bool, friction: float | None
 ) -> dict[str, Value]:
-    """Return the start values that put the package's own vehicle at s = 0 of the road, rolling at
-    `speed` [m/s]; `friction` scales the tyres', None leaves it as it is.
+    """Return the start values that put the package's own vehicle at s = 0 of the line that is
+    driven, rolling at `speed` [m/s]; `friction` scales the tyres', None leaves it as it is.
     """
-    pose = course.track.pose(0.0)
+    pose = line.pose(0.0)
     start: dict[str, Value] = {
         "Init.x": pose.x,
         "Init.y": pose.y,

@@ -39,6 +39,7 @@ class Result:
             "tyre_load_rms_n": 512.0,
         }
     )
+    manoeuvre: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass

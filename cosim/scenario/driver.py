@@ -19,6 +19,6 @@ class Driver(Model):
         default=None,
         ge=5,
         le=250,
-        description="start at this speed and never exceed it",
+        description="start at this speed and never exceed it; that of the manoeuvre",
         json_schema_extra=with_unit("km/h"),
     )

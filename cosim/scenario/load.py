@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from cosim.errors import InputError, Place, Problem, did_you_mean
 from cosim.limits import check_metric
+from cosim.scenario.combinations import combination_problems
 from cosim.scenario.messages import problems_of
 from cosim.scenario.overrides import apply_override
 from cosim.scenario.schema import Scenario, json_schema
@@ -50,6 +51,7 @@ def load_labelled(path: str | Path, overrides: Sequence[tuple[str, str]]) -> Sce
         scenario._source = source
         scenario._variants, found = combine(vehicle.variants, vehicle.parameters, source)
         problems += found
+        problems += combination_problems(scenario)
     if problems:
         raise InputError(sorted(problems, key=_order))
     return scenario
@@ -94,10 +96,10 @@ def _file_problems(data: dict[str, Any], source: Source) -> list[Problem]:
 def _name_problems(data: dict[str, Any], source: Source) -> list[Problem]:
     """Check the names that are known before the run: metrics and the paper's rows."""
     problems = []
-    limits = data.get("limits")
+    limits, labels, kind = data.get("limits"), _labels(data), _value(data, ("manoeuvre", "kind"))
     for index, limit in enumerate(limits if isinstance(limits, list) else ()):
         metric = limit.get("metric") if isinstance(limit, dict) else None
-        message = check_metric(metric, _labels(data)) if isinstance(metric, str) else None
+        message = check_metric(metric, labels, kind) if isinstance(metric, str) else None
         if message:
             problems.append(Problem(message, source.locate(("limits", index, "metric"))))
     row, rows = data.get("paper_row"), [printed.scenario for printed in paper_rows()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -11,11 +11,19 @@ from cosim.scenario.model import Model, with_unit
 from cosim.scenario.obstacles import Obstacle
 from cosim.scenario.surface import SmoothSurface, Surface, SurfaceName
 
+# Fields that describe one track only
+_TRACKS_OWN: Final = {
+    "length_m": "straight",
+    "radius_m": "circle",
+    "angle_deg": "circle",
+    "direction": "circle",
+}
+
 
 class Road(Model):
     """The road: one of the tracks with a surface, or an OpenCRG file."""
 
-    track: Literal["hockenheim", "heilbronn", "rural", "straight"] | None = Field(
+    track: Literal["hockenheim", "heilbronn", "rural", "straight", "circle"] | None = Field(
         default=None, description="layout of the road"
     )
     surface: Surface = Field(
@@ -34,8 +42,25 @@ class Road(Model):
         default=None,
         ge=10,
         le=20_000,
-        description="length of the straight track",
+        description="length of the straight track; long enough for the manoeuvre if not given",
         json_schema_extra=with_unit("m"),
+    )
+    radius_m: float | None = Field(
+        default=None,
+        ge=10,
+        le=1000,
+        description="radius of the circle",
+        json_schema_extra=with_unit("m"),
+    )
+    angle_deg: float | None = Field(
+        default=None,
+        ge=30,
+        le=360,
+        description="angle that the circle turns by, 270 deg if not given",
+        json_schema_extra=with_unit("deg"),
+    )
+    direction: Literal["left", "right"] | None = Field(
+        default=None, description="side that the circle turns to, left if not given"
     )
     file: str | None = Field(
         default=None, min_length=1, description="an OpenCRG file, relative to the scenario file"
@@ -51,13 +76,15 @@ class Road(Model):
         given = self.model_fields_set
         if (self.track is None) == (self.file is None):
             raise PydanticCustomError("one_road", "give either track or file")
-        if self.file is not None and given & {"surface", "obstacles", "length_m"}:
+        if self.file is not None and given & {"surface", "obstacles", *_TRACKS_OWN}:
             raise PydanticCustomError(
                 "file_road",
                 "surface, obstacles and length_m belong to a track; a road file has its own",
             )
-        if self.length_m is not None and self.track != "straight":
-            raise PydanticCustomError("straight", "length_m belongs to the straight track only")
-        if self.length_m is None and self.track == "straight":
-            raise PydanticCustomError("straight", "the straight track needs its length_m")
+        for field, track in _TRACKS_OWN.items():
+            if getattr(self, field) is not None and self.track != track:
+                message = "{field} belongs to the {track} track only"
+                raise PydanticCustomError(track, message, {"field": field, "track": track})
+        if self.track == "circle" and self.radius_m is None:
+            raise PydanticCustomError("circle", "the circle needs its radius_m")
         return self

@@ -23,6 +23,7 @@ from cosim.errors import Place, Problem, did_you_mean
 from cosim.scenario.controllers import Controller, Passive
 from cosim.scenario.driver import Driver
 from cosim.scenario.limit import Limit
+from cosim.scenario.manoeuvre import Manoeuvre
 from cosim.scenario.model import Model, with_unit
 from cosim.scenario.road import Road
 from cosim.scenario.source import Key, Source
@@ -65,11 +66,14 @@ class Scenario(Model):
     description: str = Field(default="", description="what the scenario shows")
     duration: Annotated[Literal["lap"] | float, BeforeValidator(_check_duration)] = Field(
         default="lap",
-        description="'lap' for once along the road, or seconds",
+        description="'lap' for once along the road or the whole manoeuvre, or seconds",
         json_schema_extra=with_unit("s"),
     )
     seed: int = Field(default=1, ge=0, description="seed of everything random in the scenario")
     road: Road
+    manoeuvre: Manoeuvre | None = Field(
+        default=None, description="what is driven on the road; the road itself if not given"
+    )
     driver: Driver = Driver()
     vehicle: Vehicle = Vehicle()
     sensor: Sensor = Sensor()

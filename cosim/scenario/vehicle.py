@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from cosim.scenario.model import Model
+from cosim.scenario.outline import EVOQUE, Outline
 
 
 def _check_parameter(value: object) -> object:
@@ -56,6 +57,9 @@ class Vehicle(Model):
     )
     variables: dict[str, Variable] = Field(
         default_factory=dict, description="quantity to variable, for an FMU with other names"
+    )
+    outline: Outline = Field(
+        default=EVOQUE, description="the body seen from above, which has to clear cones"
     )
 
     @model_validator(mode="after")
