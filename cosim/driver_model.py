@@ -31,7 +31,7 @@ class DriverModel:
     preview_time: float = 0.13  # curvature preview: rack and tyre lags [s]
     correction_time: float = 0.6  # look-ahead of the correction [s]
     correction_distance: float = 4.0  # its minimum [m]
-    learning_time: float = 1.5  # of the understeer in bends beyond `learning_from` [s]
+    learning_time: float = 3.0  # of the understeer in bends beyond `learning_from` [s]
     learning_from: float = 5.5  # m/s2, more than any driving style
     pedal_lag: float = 0.15  # [s]
     speed_gain: float = 1.0  # 1/s

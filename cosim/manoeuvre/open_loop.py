@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 from typing import Final
@@ -128,10 +129,14 @@ def dwell_figures(motion: Motion, begin: int, steering_s: float, side: float) ->
 
 
 def _displacement(motion: Motion, begin: int, time: Array) -> float:
-    """Return how far left of its straight course the car is after `DISPLACEMENT_S` [m]."""
+    """Return how far left of its course of the last half second before the steering the car is
+    after `DISPLACEMENT_S` [m].
+    """
     x = float(np.interp(DISPLACEMENT_S, time, motion.x)) - motion.x[begin]
     y = float(np.interp(DISPLACEMENT_S, time, motion.y)) - motion.y[begin]
-    course = motion.yaw[begin] + motion.side_slip[begin]
+    first = int(np.searchsorted(time, -0.5))
+    before = complex(motion.x[begin] - motion.x[first], motion.y[begin] - motion.y[first])
+    course = cmath.phase(before) if abs(before) > 0.0 else float(motion.yaw[begin])
     return float(y * math.cos(course) - x * math.sin(course))
 
 

@@ -66,17 +66,19 @@ def _key(location: tuple[str | int, ...], data: Any, kind: str) -> Key:
 def _sentence(finding: dict[str, Any], key: Key, schema: dict[str, Any]) -> str:
     kind, context, value = finding["type"], finding.get("ctx", {}), finding["input"]
     name, above, whole = _dotted(key), _dotted(key[:-1]), schema["title"].lower()
-    unit = _unit(_descend(schema, finding["loc"]))
+    part = _descend(schema, finding["loc"])
+    unit = _unit(part)
     if kind == "extra_forbidden":
         return _unknown(str(key[-1]), above, finding["loc"], schema)
     if kind == "missing":
         return f"{above or f'the {whole}'} has no {key[-1]}, which it needs"
     if kind == "literal_error":
-        choices = _choices(_descend(schema, finding["loc"]))
+        choices = _choices(part)
         hint = did_you_mean(str(value), choices)
         return f"{name} must be {_one_of(choices)}, not {_shown(value)}{hint}"
-    if kind in ("union_tag_invalid", "union_tag_not_found"):
-        return _wrong_kind(name, value, _descend(schema, finding["loc"]))
+    tag = kind in ("union_tag_invalid", "union_tag_not_found")
+    if tag or (kind == "model_attributes_type" and _kinds(part)):
+        return _wrong_kind(name, value, part)
     if kind in BOUNDS:
         words, bound = BOUNDS[kind]
         return f"{name} must be {words} {context[bound]:g}{unit}, not {_shown(value)}{unit}"
