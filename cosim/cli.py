@@ -104,7 +104,15 @@ def dataset(recipe: Path, out: Path, workers: int) -> None:
 @click.argument("fmus", metavar="FMU...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print the reports as JSON on stdout.")
 @click.option("--static", is_flag=True, help="Only read the FMU; do not run it.")
-def check(fmus: tuple[Path, ...], as_json: bool, static: bool) -> None:
+@click.option(
+    "--timeout",
+    metavar="S",
+    default=20.0,
+    show_default=True,
+    type=click.FloatRange(min=0, min_open=True),
+    help="Wall time in s that one call of an FMU may take.",
+)
+def check(fmus: tuple[Path, ...], as_json: bool, static: bool, timeout: float) -> None:
     """Find the defects of co-simulation FMUs, FMI 2.0 or 3.0, in their files and while they run.
 
     Each FMU runs in processes of its own, so that a crash or a hang becomes a finding.
@@ -112,7 +120,7 @@ def check(fmus: tuple[Path, ...], as_json: bool, static: bool) -> None:
     with _failures_as_exit_codes():
         from cosim.check.command import run as run_checks
 
-        code = run_checks(fmus, as_json, static)
+        code = run_checks(fmus, as_json, static, timeout)
     sys.exit(code)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 Edit = Callable[[ET.Element], None]
@@ -21,7 +21,7 @@ def mutate(
 ) -> Path:
     """Write the FMU `source` with edited XML entries, other contents (None: left out) and names."""
     files, renamed, edits = dict(files or {}), renamed or {}, edits or {}
-    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
         for name in old.namelist():
             content: bytes | None = files.pop(name, old.read(name))
             if content is None:
@@ -112,14 +112,15 @@ def version_of(root: ET.Element) -> int:
 
 
 def patched(
-    sources: Mapping[str, bytes], changes: Mapping[str, tuple[str, str]]
+    sources: Mapping[str, bytes], changes: Sequence[tuple[str, str, str]]
 ) -> dict[str, bytes]:
-    """Return C sources with one replacement in each named file; the old text must be there."""
-    result = dict(sources)
-    for name, (old, new) in changes.items():
-        if name not in result:  # a file of the other FMI version
-            continue
-        text = result[name].decode()
-        assert re.search(old, text), (name, old)
-        result[name] = re.sub(old, new.replace("\\", r"\\"), text, count=1).encode()
-    return result
+    """Return C sources after replacements (file, pattern, text); each pattern must be there.
+
+    A change to a file of the other FMI version is passed over.
+    """
+    result = {name: content.decode() for name, content in sources.items()}
+    for name, old, new in changes:
+        if name in result:
+            assert re.search(old, result[name]), (name, old)
+            result[name] = re.sub(old, new.replace("\\", r"\\"), result[name], count=1)
+    return {name: text.encode() for name, text in result.items()}

@@ -248,7 +248,7 @@ XML_MUTANTS = [
     ("start-not-allowed", put("Out.FL", start="1.0"), ["Out.FL"]),
     ("illegal-combination", put_outer("Lag.Start", variability="discrete"), ["Lag.Start", "fixed"]),
     ("illegal-combination", continuous_flag, ["Out.Above", "Boolean"]),
-    ("description-missing", put_outer("Lag.Gain", description=None), ["1 of", "Lag.Gain"]),
+    ("description-missing", put_outer("Lag.Gain", description=None), ["Lag.Gain"]),
     ("independent-variable", second_time, ["Lag.TimeFL", "Lag.TimeFR"]),
     ("structure-output-missing", unlist_output, ["Out.FL"]),
     ("structure-output-extra", list_input("Outputs", "Output"), ["In.u", "input"]),

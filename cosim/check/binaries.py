@@ -10,7 +10,7 @@ from typing import Final
 
 from cosim.check.archive import Archive
 from cosim.check.description import Description
-from cosim.check.finding import Finding, listed
+from cosim.check.finding import Finding, listed, numbered
 from cosim.check.shared_library import LibraryError, SharedLibrary, read_library
 from cosim.check.symbols import reason, required, standard_functions
 
@@ -163,6 +163,6 @@ def _extra(library: SharedLibrary, name: str) -> Iterator[Finding]:
     if extra:
         yield Finding(
             "symbol-extra", name,
-            f"{name} exports {len(extra)} symbols that are not of the standard: {listed(extra)}; "
-            "they may clash with other libraries (hide them: -fvisibility=hidden)",
+            f"{name} exports {numbered(len(extra), 'symbol')} beyond the standard: "
+            f"{listed(extra)}; other libraries may have the same (hide them: -fvisibility=hidden)",
         )  # fmt: skip

@@ -8,6 +8,7 @@ from cosim.check.archive import MODEL_DESCRIPTION, Archive, archive_findings
 from cosim.check.binaries import binary_findings, missing_here
 from cosim.check.contents import resource_findings, source_findings, terminal_findings
 from cosim.check.description import Description
+from cosim.check.dynamic import run_trials
 from cosim.check.experiment import experiment_findings, interface_findings
 from cosim.check.finding import Report
 from cosim.check.other_tool import other_tool_findings
@@ -18,10 +19,12 @@ from cosim.check.variables import variable_findings
 from cosim.errors import InputError
 
 
-def check(path: Path, static: bool = False) -> Report:
+def check(path: Path, static: bool = False, timeout: float = 20.0) -> Report:
     """Return all that is wrong with an FMU; with `static` it is only read, not run.
 
-    Raises `InputError` if the file is no readable archive, or of another FMI version than 2.0, 3.0.
+    `timeout` is how long one call of the FMU may take [s]. Raises `InputError` if the file is no
+    readable archive, or of another FMI version than 2.0, 3.0, and `CheckerError` if the checker
+    itself is at fault.
     """
     report = Report(path)
     archive = Archive(path)
@@ -34,6 +37,8 @@ def check(path: Path, static: bool = False) -> Report:
         if not static and description.simulation is not None:
             report.add(missing_here(archive, description))
         report.add(other_tool_findings(report))
+        if not static and description.simulation is not None:
+            run_trials(archive, description, report, timeout)
     finally:
         archive.close()
     return report

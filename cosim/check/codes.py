@@ -107,12 +107,51 @@ FILES: Final = {
         symbol_other_interface="functions of model exchange are missing, wanted since FMI 3.0.1",
     ),
 }
-CODES: Final[dict[str, Code]] = {**ARCHIVE, **XML, **FILES}
+RUNNING: Final = {
+    **_errors(
+        call_failed="a call that must succeed answers Error",
+        cannot_load="the system cannot load the binary",
+        crash="the FMU crashes its process",
+        hang="a call does not return",
+        initialise_failed="the default start values do not initialise it",
+        instances_share="two instances in one process change each other",
+        instantiate_failed="it cannot be instantiated",
+        not_deterministic="two runs with the same inputs differ",
+        output_not_finite="an output is NaN or infinite",
+        path_sensitive="it does not run in a folder with spaces and letters beyond ASCII",
+        process_ended="the FMU ends its process",
+        reset_incomplete="after reset it is not as a fresh instance",
+        serialise_failed="a state cannot go through bytes, though the flag promises it",
+        serialised_state_differs="a state that went through bytes goes on differently",
+        state_call_failed="a state cannot be got, though the flag promises it",
+        state_not_restored="a replay from a saved state differs",
+        start_differs="the binary starts a parameter or input at another value than the XML",
+        step_failed="a step of the default experiment fails",
+        step_size_refused="another step size is refused, though the flag promises it",
+        terminate_failed="it cannot be terminated after the last step",
+        time_wrong="the time that it tells is not that of the steps",
+        token_mismatch="the binary does not accept the token of the XML",
+        token_not_checked="a wrong token is accepted",
+        value_not_kept="a parameter or input reads back another value than was set",
+        version_mismatch="the binary is of another FMI version than the XML",
+        wrong_order_accepted="a call at the wrong time answers OK",
+    ),
+    **_warnings(
+        inputs_refused="a step fails when inputs move within their ranges",
+        log_category_undeclared="it logs under a category that the XML does not declare",
+        memory_growth="memory grows with every life of an instance",
+        outputs_constant="continuous outputs do not change though the inputs move",
+        set_refused="a value within its range is refused",
+        stop_time_ignored="a step past the given stop time answers OK",
+        thread_bound="it cannot be stepped on another thread than it was made on",
+    ),
+}
+CODES: Final[dict[str, Code]] = {**ARCHIVE, **XML, **FILES, **RUNNING}
 
 
 def as_markdown() -> str:
     """Return the tables of docs/check.md: `python -m cosim.check.codes`."""
-    titles = {"The archive": ARCHIVE, "The XML": XML, "The files": FILES}
+    titles = {"The archive": ARCHIVE, "The XML": XML, "The files": FILES, "Running": RUNNING}
     parts = []
     for title, codes in titles.items():
         rows = [f"| `{name}` | {code.severity} | {code.meaning} |" for name, code in codes.items()]

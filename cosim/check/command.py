@@ -9,19 +9,20 @@ from pathlib import Path
 
 from cosim.check.checker import check
 from cosim.check.show import show
-from cosim.errors import InputError, did_you_mean
+from cosim.errors import CosimError, did_you_mean
 
 
-def run(paths: Sequence[Path], as_json: bool, static: bool) -> int:
+def run(paths: Sequence[Path], as_json: bool, static: bool, timeout: float) -> int:
     """Check every file, print the reports, return the exit code: the worst of all files.
 
-    A file that cannot be read does not keep the others from being checked.
+    A file that cannot be read does not keep the others from being checked. `timeout` is how long
+    one call of an FMU may take [s].
     """
     code, reports = 0, []
     for path in paths:
         try:
-            report = check(path, static)
-        except InputError as error:
+            report = check(path, static, timeout)
+        except CosimError as error:
             hint = _nearest(path)
             print(f"error: {error}{hint}", file=sys.stderr)
             reports.append({"file": str(path), "error": f"{error}{hint}"})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -45,7 +45,8 @@ class Report:
     def add(self, findings: Iterable[Finding]) -> None:
         """Add findings; what is already there by code and place is not said twice."""
         known = {(f.code, f.where, f.message) for f in self.findings}
-        for finding in findings:
+        for raw in findings:
+            finding = replace(raw, message=" ".join(raw.message.split()))
             if (finding.code, finding.where, finding.message) not in known:
                 self.findings.append(finding)
         self.findings.sort(key=lambda finding: finding.order)

@@ -141,8 +141,7 @@ def _used(description: Description) -> Iterator[Finding]:
     if bare:
         yield Finding(
             "unit-missing", MODEL_DESCRIPTION,
-            f"{len(bare)} real inputs and outputs have no unit: {listed(bare)}; write '1' for a "
-            "plain number",
+            f"real inputs and outputs without a unit: {listed(bare)}; write '1' for a plain number",
         )  # fmt: skip
 
 

@@ -243,7 +243,7 @@ def _descriptions(description: Description) -> Iterator[Finding]:
     if public:
         yield Finding(
             "description-missing", place(public[0]),
-            f"{len(public)} of the parameters, inputs and outputs have no description: "
+            "parameters, inputs and outputs without a description: "
             f"{listed(v.name for v in public)}",
         )  # fmt: skip
 
