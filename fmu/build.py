@@ -31,7 +31,7 @@ FMU_DIRECTORY = Path(__file__).resolve().parent
 COMMON = FMU_DIRECTORY / "common"
 VERSIONS = (2, 3)  # of FMI
 # -ffp-contract=off: the same results on processors with and without fused multiply-add
-# -Wno-psabi: vectors of four are passed to inlined functions only, where no calling convention applies
+# -Wno-psabi: vectors of four go to inlined functions only, where no calling convention applies
 PORTABLE = [
     *["-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"],
     "-Wno-psabi",

@@ -97,7 +97,24 @@ class Plot:
     caption: str
 
 
+@dataclass(frozen=True)
+class Study:
+    """A table of the page that reports and does not judge: text before it, header, rows."""
+
+    section: str
+    text: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str | float, ...], ...]
+
+    def markdown(self) -> str:
+        """Text and table."""
+        lines = [[f"{c:.3g}" if isinstance(c, float) else c for c in row] for row in self.rows]
+        ruled = [list(self.header), ["---"] * len(self.header), *lines]
+        return f"\n{self.text}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in ruled)
+
+
 LEDGER: dict[tuple[str, str], Gate] = {}
+STUDIES: list[Study] = []
 PLOTS: dict[str, Plot] = {}
 
 
@@ -128,6 +145,7 @@ def page() -> str:
         text += f"\n## {number}. {section}\n\n"
         text += "| check | oracle | tolerance | measured | pass |\n|---|---|---|---|---|\n"
         text += "".join(f"{g.row()}\n" for g in gates)
+        text += "".join(study.markdown() for study in STUDIES if study.section == section)
         for plot in (p for p in PLOTS.values() if p.section == section):
             text += f"\n![{plot.caption}]({plot.file})\n\n{plot.caption}\n"
     return text
