@@ -120,6 +120,13 @@ INLINE void advance(State *x, double h, double a, const State *f, double b, cons
     }
 }
 
+INLINE void step_on(const Variables *p, Memory *m, double h, double a, const State *f, double b, const State *g) {
+    const Four angle = m->x.angle;
+    advance(&m->x, h, a, f, b, g);
+    settle(p, &m->x);
+    if (encoder_is_on(p)) encoder_step(p, m, (const double *)&angle, h);
+}
+
 typedef void Derivative(const Variables *p, const Vehicle *c, Memory *m, const State *x, Work *w, State *dx);
 
 /* Second-order Adams-Bashforth: one evaluation a step. The inputs jump at every communication point, where the previous
@@ -131,13 +138,11 @@ INLINE void integrate(const Variables *p, const Vehicle *c, Memory *m, double h,
     advance(&trial, h, 1, &f[0], 0, &f[0]);
     settle(p, &trial);
     evaluate(p, c, m, &trial, w, &f[1]);
-    advance(&m->x, h, 0.5, &f[0], 0.5, &f[1]);
-    settle(p, &m->x);
+    step_on(p, m, h, 0.5, &f[0], 0.5, &f[1]);
     for (int n = 1; n < steps; ++n) {
         State *now = &f[n & 1], *before = &f[(n & 1) ^ 1];
         evaluate(p, c, m, &m->x, w, now);
-        advance(&m->x, h, 1.5, now, -0.5, before);
-        settle(p, &m->x);
+        step_on(p, m, h, 1.5, now, -0.5, before);
     }
     evaluate(p, c, m, &m->x, w, &f[0]);
 }

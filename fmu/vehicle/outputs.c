@@ -63,13 +63,17 @@ static double middle_speed(const double v[CORNERS]) {
     return (sum - low - high) / 2;
 }
 
-static void sensor_outputs(Variables *v, const Vehicle *c, const State *x, const Work *w) {
+static void sensor_outputs(Variables *v, const Vehicle *c, Memory *m, const Work *w) {
+    const State *x = &m->x;
     double reading[6];
     imu_reading(c, x, w, reading);
     const double *r = v->Sensor_Imu_Cutoff > 0 ? x->imu : reading;
     v->Sensor_Imu_ax = r[0], v->Sensor_Imu_ay = r[1], v->Sensor_Imu_az = r[2];
     v->Sensor_Imu_RollVel = r[3], v->Sensor_Imu_PitchVel = r[4], v->Sensor_Imu_YawRate = r[5];
-    v->Sensor_Esc_vx = middle_speed(v->Car_v);
+    store(v->Sensor_WheelSpd, FOUR(v->Car_WheelSpd));
+    if (encoder_is_on(v)) encoder_read(v, m, v->Sensor_WheelSpd);
+    store(v->Sensor_v, v->Wheel_KinematicRadius * FOUR(v->Sensor_WheelSpd));
+    v->Sensor_Esc_vx = middle_speed(v->Sensor_v);
 }
 
 static void energy_outputs(Variables *v, const Vehicle *c, const State *x, const Work *w) {
@@ -88,7 +92,7 @@ void vehicle_outputs(Variables *v, const Vehicle *c, Memory *m, const Work *w) {
     const State *x = &m->x;
     body_outputs(v, c, x, w);
     corner_outputs(v, x, w);
-    sensor_outputs(v, c, x, w);
+    sensor_outputs(v, c, m, w);
     energy_outputs(v, c, x, w);
     v->Steer_WhlAng = m->steer;
     v->Car_Road_sRoad = v->Car_tx, v->Car_Road_tRoad = v->Car_ty;

@@ -21,13 +21,6 @@ INLINE void powertrain(const Variables *p, const Vehicle *c, const State *x, Wor
     const Four motor_speed = larger(p->PT_GearRatio * magnitude(x->motor_speed), splat(1.0));
     const Four available = smaller(splat(p->PT_MotorTorque), p->PT_MotorPower / motor_speed);
     const Four demand = p->DM_Gas * c->drive_share * available * slip_share(p, w->tyre.slip_x);
-    const Four slack = x->motor_speed - shaft_speed;
-    const Four shaft = FOUR(p->PT_ShaftStiffness) * x->windup + p->PT_ShaftDamping * slack;
-    const Four geared = p->PT_GearRatio * x->motor_torque;
-    dx->motor_torque = (demand - x->motor_torque) * (1 / p->PT_TorqueLag);
-    dx->motor_speed = (geared - shaft) * (1 / (p->PT_RotorInertia * p->PT_GearRatio * p->PT_GearRatio));
-    dx->windup = slack;
-
     /* Coulomb friction with an elastic stick phase: a wheel that stands does not creep. Slip control lets go of
      * the brake only while the car rolls, else it would release the parked car. */
     const Mask rolls = magnitude(dot(w->corner.v, w->contact.forward)) > 2.0;
@@ -35,6 +28,17 @@ INLINE void powertrain(const Variables *p, const Vehicle *c, const State *x, Wor
     const Four brake = within(p->Brake_Stiffness * x->brake_windup + p->Brake_Damping * brake_speed, -capacity, capacity);
     dx->brake_torque = (brake_demand(p, c) * slip_share(p, slip) - capacity) * (1 / p->Brake_Lag);
     dx->brake_windup = brake_speed;
+
+    const double rotor = p->PT_RotorInertia * p->PT_GearRatio * p->PT_GearRatio;
+    const Four geared = p->PT_GearRatio * x->motor_torque;
+    Four slack = x->motor_speed - shaft_speed, shaft = FOUR(p->PT_ShaftStiffness) * x->windup + p->PT_ShaftDamping * slack;
+    if (p->PT_RigidShafts) { /* wheel and rotor gain speed alike */
+        shaft = (p->Wheel_Inertia * geared + rotor * (brake - w->axial_moment)) * (1 / (p->Wheel_Inertia + rotor));
+        slack = splat(0.0);
+    }
+    dx->motor_torque = (demand - x->motor_torque) * (1 / p->PT_TorqueLag);
+    dx->motor_speed = (geared - shaft) * (1 / rotor);
+    dx->windup = slack;
 
     dx->spin = (shaft - brake + w->axial_moment) * (1 / p->Wheel_Inertia);
     dx->angle = brake_speed;

@@ -38,7 +38,8 @@ INLINE Forces magic_formula(const Variables *p, Four Fz, Four kappa, Four tan_al
     gamma *= side;
 
     f.peak_x = (p->Tire_PDX1 + p->Tire_PDX2 * d) * p->Tire_FrictionX * p->Road_Friction * Fz;
-    const Four Kx = Fz * (p->Tire_PKX1 + p->Tire_PKX2 * d) * exponential(p->Tire_PKX3 * d);
+    Four Kx = splat(Fz0 * p->Tire_PKX1);
+    if (p->Tire_LoadDependentSlip) Kx = Fz * (p->Tire_PKX1 + p->Tire_PKX2 * d) * exponential(p->Tire_PKX3 * d);
     const Four Ex = p->Tire_PEX1 + (p->Tire_PEX2 + p->Tire_PEX3 * d) * d;
     const Four Fx0 = f.peak_x * sine(p->Tire_PCX1 * shape(Kx / (p->Tire_PCX1 * f.peak_x), Ex, kappa));
 

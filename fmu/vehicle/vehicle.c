@@ -35,6 +35,7 @@ ModelStatus model_initialise(Model *m) {
     memory->steer = m->v.DM_Steer_Ang;
     vehicle_derivative(&m->v, c, memory, &memory->x, &w, &dx);
     imu_reading(c, &memory->x, &w, memory->x.imu);
+    encoder_start(&m->v, memory, (const double *)&memory->x.spin);
     vehicle_outputs(&m->v, c, memory, &w);
     return MODEL_OK;
 }

@@ -39,6 +39,9 @@ enum { STATES = sizeof(State) / sizeof(double) };
 typedef struct {
     State x;
     double steer;          /* the steering-wheel angle that the last step held */
+    double edge[CORNERS], edge_age[CORNERS];      /* of the wheel-speed sensors: last edge passed, and how long ago, s */
+    double used_edge[CORNERS], used_age[CORNERS]; /* the edge that the last reading ended with */
+    double edge_speed[CORNERS];                   /* the last reading, rad/s */
     int hint[CORNERS + 1]; /* last road segment of each wheel and of the body */
 } Memory;
 
@@ -116,6 +119,13 @@ void vehicle_derivative(const Variables *p, const Vehicle *c, Memory *m, const S
 void vehicle_integrate(const Variables *p, const Vehicle *c, Memory *m, double h, int steps, Work *w);
 /* parameters.c */
 ModelStatus vehicle_constants(Model *m, Vehicle *c);
+/* encoder.c */
+INLINE int encoder_is_on(const Variables *p) { return p->Sensor_WheelSpd_Teeth > 0; }
+void encoder_start(const Variables *p, Memory *m, const double spin[CORNERS]);
+/* One internal step of length h, over which the wheel turns evenly: which edge came last, and how long ago. */
+void encoder_step(const Variables *p, Memory *m, const double angle_before[CORNERS], double h);
+/* Speeds at a communication point, rad/s. */
+void encoder_read(const Variables *p, Memory *m, double speed[CORNERS]);
 /* equilibrium.c */
 ModelStatus equilibrium(Model *m, const Vehicle *c, Memory *memory);
 /* outputs.c */
