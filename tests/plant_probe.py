@@ -60,6 +60,7 @@ SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "rolling_radius": (_REAL, _POINTER, _REAL, _REAL),
     "tyre": (None, _POINTER, _POINTER, _INT, _POINTER),
     "damper": (_REAL, _POINTER, _INT, _REAL),
+    "encoder": (None, _POINTER, _INT, _INT, _REAL, _POINTER, _POINTER),
     "elementary": (None, _INT, _INT, _POINTER, _POINTER),
 }
 
@@ -135,6 +136,15 @@ class Probe:
             given[name] = value
         self._lib.probe_tyre(self._plant, given.ctypes.data, corner, out.ctypes.data)
         return dict(zip(GRIP_NAMES, out.tolist(), strict=True))
+
+    def encoder(self, angle: Array, steps: int, h: float) -> Array:
+        """Readings [rad/s] of the wheel-speed sensor, one per `steps` internal steps of h [s], of
+        a wheel that stands at angle[k] [rad] at k h.
+        """
+        angle = np.ascontiguousarray(angle, dtype=np.float64)
+        out = np.empty((len(angle) - 1) // steps)
+        self._lib.probe_encoder(self._plant, len(out), steps, h, angle.ctypes.data, out.ctypes.data)
+        return out
 
     def elementary(self, which: int, x: Array) -> Array:
         """The plant's own sine (0), cosine (1), arctangent (2) or exponential (3) of each x."""

@@ -152,3 +152,21 @@ void probe_elementary(int which, int n, const double x[], double out[]) {
         out[k] = y[k & 3];
     }
 }
+
+/* A wheel that turns to angle[k] at time k h; out[n] is the sensor's reading after every `steps` of these. */
+void probe_encoder(const Plant *plant, int readings, int steps, double h, const double angle[], double out[]) {
+    Memory m;
+    double speed[CORNERS];
+    memset(&m, 0, sizeof m);
+    m.x.angle = splat(angle[0]);
+    encoder_start(&plant->model.v, &m, (double[CORNERS]){0});
+    for (int n = 0; n < readings; ++n) {
+        for (int k = 1; k <= steps; ++k) {
+            const Four before = m.x.angle;
+            m.x.angle = splat(angle[n * steps + k]);
+            encoder_step(&plant->model.v, &m, (const double *)&before, h);
+        }
+        encoder_read(&plant->model.v, &m, speed);
+        out[n] = speed[n % CORNERS];
+    }
+}
