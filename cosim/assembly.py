@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim import loop
 from cosim.comfort import ride_figures
@@ -30,6 +31,8 @@ from cosim.start import builtin_start, checked_parameters
 from cosim.vehicle import RECORDED, Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
 from sensor import OUTPUTS, SAMPLE_RATE_HZ, OnnxSensor, SensorError, default_model
+
+Array = npt.NDArray[np.float64]
 
 STEP_S: Final = 1 / SAMPLE_RATE_HZ
 SETTLING_S: Final = 2.0  # left out of the ride figures: the road's unevenness is still fading in
@@ -87,6 +90,17 @@ class Assembly:
 
     def _unfinished(self) -> str:
         return "the road ended before the manoeuvre" if self.driver.finished else self.if_late
+
+
+def check(scenario: Scenario) -> float:
+    """Look for all that can be wrong with a scenario before its first step, and build its road.
+
+    Returns the simulated time that a run of it may take [s]. Raises `InputError` with everything
+    wrong, `FmuError` or `NetworkError` for a file that does not load.
+    """
+    *_, plan = _checked(scenario)
+    _network(scenario)
+    return _steps(scenario, plan)[0] * STEP_S
 
 
 def assemble(

@@ -1,27 +1,28 @@
 """The command line; heavy packages are imported where they are used, so that `--help` is quick.
 
 Results for programs go to stdout (`--json`), words for people to stderr. Exit codes: 0 fine, 1 a
-limit failed, 2 wrong usage or bad input, 3 an FMU or a network failed, 130 interrupted.
+limit failed, 2 wrong usage or bad input, 3 an FMU or a network failed, 130 interrupted; of several
+scenarios the highest.
 """
 
 from __future__ import annotations
 
+import json
+import os
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from cosim.errors import CosimError
 
-if TYPE_CHECKING:
-    from cosim.run import Outcome, Progress
-    from cosim.tables import Table
-
 INTERRUPTED = 130
+# Libraries would start a thread per core: slower for arrays as small as these, and sums in another
+# order where a batch leaves each process one core.
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -31,54 +32,59 @@ def main() -> None:
 
 
 @main.command()
-@click.argument("scenario")
-@click.option("--json", "as_json", is_flag=True, help="Print the metrics as JSON on stdout.")
+@click.argument("scenarios", metavar="SCENARIO...", nargs=-1, required=True)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print the metrics as JSON on stdout; a list for several scenarios or a folder.",
+)
 @click.option("--duration", metavar="S", help="Simulate S seconds, whatever the scenario says.")
 @click.option(
     "--output-dir",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Where the results go; results/SCENARIO by default.",
+    help="Where the results go; results/SCENARIO by default, DIR/SCENARIO for several.",
 )
 @click.option(
     "--set",
     "overrides",
     metavar="KEY=VALUE",
     multiple=True,
-    help="Override a field of the scenario; may be repeated.",
+    help="Override a field of the scenario, of each where there are several; may be repeated.",
+)
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(1),
+    help="Run up to N scenarios at the same time, as many as there are cores by default.",
 )
 def run(
-    scenario: str,
+    scenarios: tuple[str, ...],
     as_json: bool,
     duration: str | None,
     output_dir: Path | None,
     overrides: tuple[str, ...],
+    jobs: int | None,
 ) -> None:
-    """Run SCENARIO, a YAML file, and write its results.
+    """Run each SCENARIO, a YAML file or a folder of them, and write the results.
 
     Fields are overridden by their dotted path, items of a list by their number from 0:
     --set driver.style=normal, --set controllers.0.kind=passive.
     """
+    labelled = [(text, f"--set {text}") for text in overrides]
+    if duration is not None:
+        labelled.append((f"duration={duration}", f"--duration {duration}"))
+    for name in ONE_THREAD:
+        os.environ.setdefault(name, "1")
     with _failures_as_exit_codes():
-        from cosim.scenario.load import load_labelled
-
-        labelled = [(text, f"--set {text}") for text in overrides]
-        if duration is not None:
-            labelled.append((f"duration={duration}", f"--duration {duration}"))
-        settings = load_labelled(scenario, labelled)
-        target = output_dir or Path("results") / Path(scenario).stem
-
-        from cosim.run import execute
-
-        command = "cosim " + shlex.join(sys.argv[1:])
-        with _progress() as progress:
-            outcome = execute(settings, target, progress, command=command)
-        _show(outcome)
-        if as_json:
-            import json
-
-            click.echo(json.dumps(outcome.metrics, indent=2, ensure_ascii=False))
-    sys.exit(outcome.exit_code)
+        if len(scenarios) == 1 and not Path(scenarios[0]).is_dir():
+            code = _run_one(scenarios[0], labelled, output_dir, as_json)
+        else:
+            paths = [Path(name) for name in scenarios]
+            results = output_dir or Path("results")
+            code = _run_several(paths, labelled, results, as_json, jobs or _cores())
+    sys.exit(code)
 
 
 @main.command()
@@ -124,6 +130,61 @@ def check(fmus: tuple[Path, ...], as_json: bool, static: bool, timeout: float) -
     sys.exit(code)
 
 
+def _run_one(
+    scenario: str, overrides: Sequence[tuple[str, str]], output_dir: Path | None, as_json: bool
+) -> int:
+    from cosim import show
+    from cosim.scenario.load import load_labelled
+
+    settings = load_labelled(scenario, overrides)
+    target = output_dir or Path("results") / Path(scenario).stem
+
+    from cosim.run import execute
+
+    command = "cosim " + shlex.join(sys.argv[1:])
+    with show.progress() as progress:
+        outcome = execute(settings, target, progress, command=command)
+    show.outcome(outcome)
+    if as_json:
+        _print_json(outcome.metrics)
+    return outcome.exit_code
+
+
+def _run_several(
+    paths: Sequence[Path],
+    overrides: Sequence[tuple[str, str]],
+    results: Path,
+    as_json: bool,
+    processes: int,
+) -> int:
+    from cosim import show
+    from cosim.batch import find_scenarios, plan, run_all
+
+    files, others = find_scenarios(paths)
+    for file in others:
+        click.echo(f"note: {file} has no road, so it is no scenario; left out", err=True)
+    jobs = plan(files, results, overrides)
+    ended, were_run = run_all(jobs, processes, show.counter(len(jobs)))
+    if were_run:
+        show.batch(ended)
+    else:
+        show.problems(ended)
+    if as_json:
+        _print_json([one.as_dict() for one in ended])
+    return max(one.exit_code for one in ended)
+
+
+def _print_json(value: object) -> None:
+    click.echo(json.dumps(value, indent=2, ensure_ascii=False))
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 @contextmanager
 def _failures_as_exit_codes() -> Iterator[None]:
     try:
@@ -139,81 +200,3 @@ def _failures_as_exit_codes() -> Iterator[None]:
     except KeyboardInterrupt:
         click.echo("interrupted; what was recorded until then is on disk", err=True)
         sys.exit(INTERRUPTED)
-
-
-@contextmanager
-def _progress() -> Iterator[Progress | None]:
-    """Give a progress bar per run on a terminal, nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeRemainingColumn(),
-    )
-    tasks: dict[str, TaskID] = {}
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-
-        def tell(label: str, done: int, total: int) -> None:
-            if label not in tasks:
-                tasks[label] = bar.add_task(label)
-            bar.update(tasks[label], completed=done, total=total)
-
-        yield tell
-
-
-def _show(outcome: Outcome) -> None:
-    """Say on stderr what came out."""
-    from cosim.tables import comparison_table, estimate_table, verdict_table
-
-    show = _show_rich if sys.stderr.isatty() else _show_plain
-    paper = outcome.metrics["paper"]
-    for one in outcome.runs:
-        figures = one.figures
-        factor, simulated = figures["real_time_factor"], figures["simulated_s"]
-        click.echo(
-            f"{one.label}: {figures['finish_reason']}; {simulated:.2f} s simulated,"
-            f" {factor:.1f} times real time",
-            err=True,
-        )
-    if len(outcome.runs) == 1:
-        show(estimate_table(outcome.runs[0].figures, paper))
-    else:
-        show(comparison_table({one.label: one.figures for one in outcome.runs}))
-    if outcome.verdicts:
-        show(verdict_table(outcome.verdicts))
-    for note in outcome.notes:
-        click.echo(f"note: {note}", err=True)
-    failed = sum(not verdict.passed for verdict in outcome.verdicts)
-    count = len(outcome.verdicts)
-    verdict = f"{failed} of {count} limits FAILED" if failed else f"all {count} limits hold"
-    none = "no limits for this surface" if outcome.scenario.limits else "no limits set"
-    summary = verdict if count else none
-    click.echo(f"{summary}; results in {outcome.output_dir}", err=True)
-
-
-def _show_plain(table: Table) -> None:
-    from cosim.tables import plain
-
-    click.echo(plain(table), err=True)
-
-
-def _show_rich(table: Table) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    shown = RichTable(title=table.title, title_justify="left", box=box.SIMPLE_HEAD)
-    shown.caption = table.note or None
-    for index, column in enumerate(table.columns):
-        shown.add_column(Text(column), justify="right" if index else "left")
-    styles: dict[str, str] = {"passed": "green", "FAILED": "bold red"}
-    for row in table.rows:
-        shown.add_row(*(Text(cell, style=styles.get(cell, "")) for cell in row))
-    Console(stderr=True).print(shown)

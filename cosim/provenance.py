@@ -6,6 +6,7 @@ import hashlib
 import platform
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -34,8 +35,8 @@ def provenance(files: Mapping[str, Path | None], command: str = "") -> dict[str,
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "commit": commit(),
-        "packages": {name: found for name in PACKAGES if (found := _version(name))},
+        "commit": _commit(),
+        "packages": _packages(),
         "files": {
             role: {"path": str(path), "sha256": sha256(path)}
             for role, path in files.items()
@@ -48,6 +49,16 @@ def sha256(path: Path) -> str:
     """Return the SHA-256 of a file as hexadecimal digits."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+@cache
+def _commit() -> str | None:
+    return commit()
+
+
+@cache
+def _packages() -> dict[str, str]:
+    return {name: found for name in PACKAGES if (found := _version(name))}
 
 
 def _version(name: str) -> str | None:

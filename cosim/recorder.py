@@ -126,7 +126,8 @@ class Recorder:
         with path.open("w", encoding="utf-8", newline="\n") as stream:
             stream.write(",".join(signal.header for signal in self.signals) + "\n")
             for row in self._data[: self._rows]:
-                stream.write(",".join(map(repr, row.tolist())) + "\n")
+                # what repr() calls, without its detour
+                stream.write(",".join(map(float.__repr__, row.tolist())) + "\n")
 
     def _write_parquet(self, path: Path) -> None:
         require_parquet()

@@ -100,6 +100,38 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     return Table("Limits", ("metric", "run", "measured", "required", "verdict"), rows)
 
 
+def batch_table(ended: Sequence[tuple[str, int, Mapping[str, Any] | None]]) -> Table:
+    """Return one row per run of several scenarios: each one's file, exit code and metrics.json."""
+    columns = (
+        "scenario",
+        "verdict",
+        "simulated [s]",
+        "times real time",
+        "network RMSE [m/s]",
+        "accuracy [%]",
+        "largest deviation [m]",
+    )
+    rows: list[tuple[str, ...]] = []
+    for file, code, metrics in ended:
+        if metrics is None:
+            rows.append((file, "error" if code > 1 else "FAILED", *["-"] * 5))
+            continue
+        verdicts = metrics["limits"]
+        for label, figures in metrics["runs"].items():
+            own = [verdict["passed"] for verdict in verdicts if verdict["run"] == label]
+            verdict = ("passed" if all(own) else "FAILED") if own else "no limits"
+            name = file if len(metrics["runs"]) == 1 else f"{file} ({label})"
+            cells = (
+                number(figure(figures, "simulated_s"), 1),
+                number(figure(figures, "real_time_factor"), 1),
+                number(figure(figures, "network.overall.rmse_m_s")),
+                number(figure(figures, "network.overall.accuracy_percent"), 1),
+                number(figure(figures, "largest_deviation_m"), 2),
+            )
+            rows.append((name, verdict, *cells))
+    return Table("Scenarios", columns, tuple(rows))
+
+
 def _against(first: Mapping[str, Any], figures: Mapping[str, Any], path: str) -> str:
     value, base = figure(figures, path), figure(first, path)
     if value is None:

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import bilinear, lfilter
 
 from sensor.channels import CHANNEL_NAMES, SAMPLE_RATE_HZ
 
@@ -83,11 +82,12 @@ class BodyMotion:
         """
         x = np.asarray(channels, dtype=np.float64)[:, _INPUTS]
         state = np.stack(self._settled(x[0]))
-        filtered = [
-            lfilter(self._numerator[i], self._denominator, x[:, i], zi=state[:, i])[0]
-            for i in range(len(_INPUTS))
-        ]
-        return np.stack(filtered, axis=1) @ self._mixing.T
+        filtered = np.empty_like(x)
+        for i in range(len(_INPUTS)):
+            filtered[:, i] = _filtered(
+                x[:, i].tolist(), self._numerator[i], self._denominator, state[:, i]
+            )
+        return np.asarray(filtered @ self._mixing.T)
 
     def _settled(self, x: Array) -> tuple[Array, Array]:
         """Filter states after the input (3,) has been constant forever; the output is then zero."""
@@ -98,8 +98,25 @@ def _filters(rate: float, corner_hz: float) -> tuple[Array, Array]:
     """Return numerators (3, 3) for (az, RollVel, PitchVel) and their common denominator (3,), z^-1
     powers rising.
     """
-    w = 2.0 * np.pi * corner_hz
-    denominator = [1.0, np.sqrt(2.0) * w, w * w]
-    integral, a = bilinear([1.0, 0.0], denominator, fs=rate)
-    high_pass, _ = bilinear([1.0, 0.0, 0.0], denominator, fs=rate)
-    return np.stack([integral, high_pass, high_pass]), np.asarray(a)
+    w, k = 2.0 * np.pi * corner_hz, 2.0 * rate  # bilinear rule: s = k (1 - z^-1) / (1 + z^-1)
+    middle = np.sqrt(2.0) * w * k
+    first = k * k + middle + w * w
+    denominator = np.array([first, 2.0 * (w * w - k * k), k * k - middle + w * w]) / first
+    integral = np.array([k, 0.0, -k]) / first
+    high_pass = np.array([k * k, -2.0 * k * k, k * k]) / first
+    return np.stack([integral, high_pass, high_pass]), denominator
+
+
+def _filtered(x: list[float], numerator: Array, denominator: Array, state: Array) -> list[float]:
+    """Return one channel through its filter. Written out, as SciPy's signal package takes a second
+    to import.
+    """
+    (b0, b1, b2), (_, a1, a2) = numerator.tolist(), denominator.tolist()
+    first, second = state.tolist()
+    out = []
+    for value in x:
+        y = b0 * value + first
+        first = b1 * value - a1 * y + second
+        second = b2 * value - a2 * y
+        out.append(y)
+    return out

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping
+from functools import cache
 from importlib import import_module, resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,11 +35,7 @@ class ReportError(CosimError):
 def write_report(outcome: Outcome, versions: Mapping[str, Any], path: Path) -> None:
     """Write the report to `path`; raises `ReportError` where uplot-python is not installed."""
     script, style = _uplot()
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    loader = PackageLoader("cosim.report", "templates")
-    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
-    page = environment.get_template("report.html").render(
+    page = _page().render(
         outcome=outcome,
         scenario=outcome.scenario,
         versions=versions,
@@ -52,6 +49,16 @@ def write_report(outcome: Outcome, versions: Mapping[str, Any], path: Path) -> N
         data=_json({"runs": [_signals(run) for run in outcome.runs]}),
     )
     path.write_text(page, encoding="utf-8")
+
+
+@cache
+def _page() -> Any:
+    """Return the page's template, compiled once per process."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("cosim.report", "templates")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
+    return environment.get_template("report.html")
 
 
 def facts(run: RunOutcome) -> list[tuple[str, str]]:

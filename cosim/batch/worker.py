@@ -1,0 +1,70 @@
+"""What a process of a batch does: check a scenario, or run it. Nothing heavy is imported before."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from types import FrameType
+
+from cosim.batch.job import Ended, Job
+from cosim.errors import CosimError
+
+_busy = False
+
+
+def start() -> None:
+    """Prepare the process: an interrupt ends a run as it does in a single one, idle processes go
+    without a word.
+    """
+    signal.signal(signal.SIGINT, _interrupted)
+
+
+def check(job: Job) -> Ended:
+    """Look for all that can be wrong with a scenario before its first step; build its road."""
+
+    def look() -> Ended:
+        from cosim.assembly import check as check_scenario
+        from cosim.scenario.load import load_labelled
+
+        scenario = load_labelled(job.scenario, job.overrides)
+        longest = check_scenario(scenario)
+        return Ended(job, longest_s=longest * len(scenario.controllers))
+
+    return _guarded(job, look)
+
+
+def drive(job: Job) -> Ended:
+    """Run a scenario and write its results."""
+
+    def run() -> Ended:
+        from cosim.run import execute
+        from cosim.scenario.load import load_labelled
+
+        scenario = load_labelled(job.scenario, job.overrides)
+        outcome = execute(scenario, job.output_dir, command=job.command)
+        return Ended(job, outcome.exit_code, (), outcome.metrics, outcome.notes)
+
+    return _guarded(job, run)
+
+
+def _guarded(job: Job, work: Callable[[], Ended]) -> Ended:
+    """Return what went wrong as a result: other jobs go on."""
+    global _busy
+    _busy = True
+    try:
+        return work()
+    except CosimError as error:
+        problems = tuple(str(problem) for problem in getattr(error, "problems", (error,)))
+        return Ended(job, error.exit_code, problems)
+    except OSError as error:
+        where = f"'{error.filename}': " if error.filename else ""
+        return Ended(job, 2, (f"{where}{error.strerror or error}",))
+    finally:
+        _busy = False
+
+
+def _interrupted(_number: int, _frame: FrameType | None) -> None:
+    if _busy:
+        raise KeyboardInterrupt
+    os._exit(130)

@@ -1,0 +1,129 @@
+"""What people read on the terminal; without one, the same as plain lines."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from cosim.batch import Ended
+    from cosim.run import Outcome, Progress
+    from cosim.tables import Table
+
+
+@contextmanager
+def progress() -> Iterator[Progress | None]:
+    """Give a progress bar per run on a terminal, nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+    )
+    tasks: dict[str, TaskID] = {}
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+
+        def tell(label: str, done: int, total: int) -> None:
+            if label not in tasks:
+                tasks[label] = bar.add_task(label)
+            bar.update(tasks[label], completed=done, total=total)
+
+        yield tell
+
+
+def counter(total: int) -> Callable[[Ended], None]:
+    """Return what says a line for each scenario of a batch that has ended."""
+    width, ended = len(str(total)), 0
+
+    def tell(one: Ended) -> None:
+        nonlocal ended
+        ended += 1
+        words = {0: "passed", 1: "FAILED"}.get(one.exit_code, "error")
+        click.echo(f"[{ended:{width}d}/{total}] {one.job.scenario}: {words}", err=True)
+
+    return tell
+
+
+def outcome(shown: Outcome) -> None:
+    """Say on stderr what came out of one scenario."""
+    from cosim.tables import comparison_table, estimate_table, verdict_table
+
+    paper = shown.metrics["paper"]
+    for one in shown.runs:
+        figures = one.figures
+        factor, simulated = figures["real_time_factor"], figures["simulated_s"]
+        click.echo(
+            f"{one.label}: {figures['finish_reason']}; {simulated:.2f} s simulated,"
+            f" {factor:.1f} times real time",
+            err=True,
+        )
+    if len(shown.runs) == 1:
+        table(estimate_table(shown.runs[0].figures, paper))
+    else:
+        table(comparison_table({one.label: one.figures for one in shown.runs}))
+    if shown.verdicts:
+        table(verdict_table(shown.verdicts))
+    for note in shown.notes:
+        click.echo(f"note: {note}", err=True)
+    failed = sum(not verdict.passed for verdict in shown.verdicts)
+    count = len(shown.verdicts)
+    verdict = f"{failed} of {count} limits FAILED" if failed else f"all {count} limits hold"
+    none = "no limits for this surface" if shown.scenario.limits else "no limits set"
+    summary = verdict if count else none
+    click.echo(f"{summary}; results in {shown.output_dir}", err=True)
+
+
+def batch(ended: Sequence[Ended]) -> None:
+    """Say on stderr what came out of several scenarios."""
+    from cosim.tables import batch_table
+
+    table(batch_table([(str(one.job.scenario), one.exit_code, one.metrics) for one in ended]))
+    notes = dict.fromkeys(note for one in ended for note in one.notes)
+    for note in notes:
+        click.echo(f"note: {note}", err=True)
+    problems(ended)
+    wrong = sum(one.exit_code != 0 for one in ended)
+    folder = ended[0].job.output_dir.parent
+    what = f"{wrong} of {len(ended)} scenarios FAILED" if wrong else f"all {len(ended)} passed"
+    click.echo(f"{what}; results in {folder}", err=True)
+
+
+def problems(ended: Sequence[Ended]) -> None:
+    """Say on stderr what went wrong with each scenario, its file first."""
+    for one in ended:
+        file = str(one.job.scenario)
+        for problem in one.problems:
+            words = problem if problem.startswith(file) else f"{file}: {problem}"
+            click.echo(f"error: {words}", err=True)
+
+
+def table(shown: Table) -> None:
+    """Show a table on stderr."""
+    if not sys.stderr.isatty():
+        from cosim.tables import plain
+
+        click.echo(plain(shown), err=True)
+        return
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    rich = RichTable(title=shown.title, title_justify="left", box=box.SIMPLE_HEAD)
+    rich.caption = shown.note or None
+    for index, column in enumerate(shown.columns):
+        rich.add_column(Text(column), justify="right" if index else "left")
+    styles = {"passed": "green", "FAILED": "bold red", "error": "bold red"}
+    for row in shown.rows:
+        rich.add_row(*(Text(cell, style=styles.get(cell, "")) for cell in row))
+    Console(stderr=True).print(rich)
