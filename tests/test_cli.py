@@ -91,7 +91,7 @@ def test_limits_for_another_surface_are_left_out_and_said(cosim):
         (["lap.yaml", "--set", "driver.style=fast"], "error: --set driver.style=fast: "),
         (["lap.yaml", "--output-dir", "lap.yaml"], "error: cannot write to 'lap.yaml'"),
         (["lap.yaml", "--sett", "a=1"], "No such option"),
-        ([], "Missing argument 'SCENARIO'"),
+        ([], "Missing argument 'SCENARIO...'"),
     ],
 )
 def test_exit_code_2_and_a_sentence_for_wrong_usage(cosim, arguments, text):

@@ -1,0 +1,212 @@
+"""Several scenarios in one command: real runs in real processes (cosim.batch)."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from foreign_fmu import Variable, own_variables, parrot
+from loop_rig import write_scenario
+
+from cosim.batch import Ended, Job, find_scenarios, plan, run_all
+from cosim.cli import main
+from cosim.errors import InputError
+from cosim.tables import batch_table
+
+TIMES = ("wall_time_s", "real_time_factor")  # of metrics.json: how long the machine took
+PASSES = "[{metric: largest_deviation_m, max: 1}]"
+FAILS = "[{metric: network.overall.rmse_m_s, max: 1e-9}]"
+CLOSED_LOOP = "[{kind: passive}, {kind: skyhook, feedback: truth}]"
+
+
+def cosim(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["run", *arguments])
+
+
+def bare(metrics: dict[str, Any]) -> dict[str, Any]:
+    """metrics.json without the times that the runs took."""
+    for run in metrics["runs"].values():
+        for name in TIMES:
+            del run[name]
+    return metrics
+
+
+@dataclass(frozen=True)
+class Batch:
+    folder: Path
+    result: Result
+
+    def ended(self) -> dict[str, dict[str, Any]]:
+        return {Path(one["scenario"]).stem: one for one in json.loads(self.result.stdout)}
+
+
+@pytest.fixture(scope="module")
+def batch(tmp_path_factory: pytest.TempPathFactory) -> Batch:
+    """Three that end well or with a failed limit, one whose FMU fails with words, one whose FMU
+    takes its process down, and a YAML file that is no scenario.
+    """
+    folder = tmp_path_factory.mktemp("batch")
+    below = folder / "set" / "more"
+    below.mkdir(parents=True)
+    rough = {"limits": PASSES, "seed": "7"}
+    write_scenario(folder / "set", name="good", surface="C", sections=rough)
+    write_scenario(folder / "set", name="bad_limit", surface="A", sections={"limits": FAILS})
+    write_scenario(below, name="closed", surface="B", sections={"controllers": CLOSED_LOOP})
+    far = Variable("Far", 400_000_000, "parameter", start=0.0)  # not the parrot's own memory
+    parrot(below / "p.fmu", (*own_variables().values(), far))
+    words = "{Parrot.FailAt: 20, Parrot.FailStatus: 3, Parrot.FailWords: 1}"
+    for name, parameters in (("words", words), ("dies", "{Far: 1}")):
+        vehicle = f"{{fmu: p.fmu, parameters: {parameters}}}"
+        write_scenario(below, name=name, sections={"vehicle": vehicle})
+    (folder / "set" / "recipe.yaml").write_text("runs: []\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        result = cosim("set", "--jobs", "2", "--json", "--set", "driver.style=aggressive")
+    return Batch(folder, result)
+
+
+def test_each_ends_in_its_own_way_and_the_worst_decides(batch: Batch) -> None:
+    codes = {name: one["exit_code"] for name, one in batch.ended().items()}
+    assert codes == {"good": 0, "bad_limit": 1, "closed": 0, "words": 3, "dies": 3}
+    assert batch.result.exit_code == 3
+
+
+def test_failures_are_said_in_a_sentence(batch: Batch) -> None:
+    said = batch.result.stderr
+    assert "error: set/more/words.yaml: p.fmu: could not step at t = 0.19 s: the parrot" in said
+    assert "error: set/more/dies.yaml: the process ended without a word" in said
+    assert "set/recipe.yaml has no road, so it is no scenario; left out" in said
+    assert "3 of 5 scenarios FAILED; results in results" in said
+    assert "Traceback" not in said
+
+
+def test_progress_counts_and_the_table_has_a_row_per_run(batch: Batch) -> None:
+    said = batch.result.stderr
+    assert all(f"[{n}/5] set/" in said for n in range(1, 6))
+    rows = [line.split() for line in said.splitlines() if line.startswith("  set/")]
+    assert [(row[0], row[1]) for row in rows] == [
+        ("set/bad_limit.yaml", "FAILED"),
+        ("set/good.yaml", "passed"),
+        ("set/more/closed.yaml", "(passive)"),
+        ("set/more/closed.yaml", "(skyhook_truth)"),
+        ("set/more/dies.yaml", "error"),
+        ("set/more/words.yaml", "error"),
+    ]
+
+
+def test_every_scenario_has_its_files(batch: Batch) -> None:
+    results = batch.folder / "results"
+    assert {path.name for path in results.iterdir()} == {
+        "good", "bad_limit", "closed", "words", "dies",
+    }  # fmt: skip
+    assert (results / "good" / "report.html").exists()
+    assert (results / "closed" / "skyhook_truth" / "signals.csv").exists()
+    # the rows before the FMU failed, t = 0 included
+    assert len((results / "words" / "signals.csv").read_text().splitlines()) == 1 + 20
+    versions = json.loads((results / "good" / "versions.json").read_text())
+    assert versions["command"] == "cosim run set/good.yaml --set driver.style=aggressive"
+
+
+@pytest.mark.parametrize("name", ["good", "closed"])
+def test_a_scenario_alone_gives_the_same_bits(
+    batch: Batch, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(batch.folder)
+    (file,) = Path("set").rglob(f"{name}.yaml")
+    alone = cosim(str(file), "--output-dir", f"alone/{name}", "--set", "driver.style=aggressive")
+    assert alone.exit_code == 0, alone.output
+    together = Path("results") / name
+    files = [path.relative_to(together) for path in together.rglob("signals.csv")]
+    assert files
+    for path in (*files, Path("scenario.resolved.yaml")):
+        assert (Path("alone") / name / path).read_bytes() == (together / path).read_bytes()
+    figures = [
+        bare(json.loads((folder / "metrics.json").read_text()))
+        for folder in (Path("alone") / name, together)
+    ]
+    assert figures[0] == figures[1] == bare(batch.ended()[name]["metrics"])
+
+
+def test_problems_of_all_come_before_the_first_step_of_any(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_scenario(tmp_path, name="fine")
+    write_scenario(tmp_path, name="misspelt", sections={"driver": "{sped_kmh: 3}"})
+    write_scenario(tmp_path, name="late", sections={"vehicle": "{parameters: {Bdy.Mass: 1}}"})
+    (tmp_path / "torn.yaml").write_text("name: [a\n")
+    result = cosim(".", "--jobs", "2", "--json")
+    assert result.exit_code == 2
+    assert "error: misspelt.yaml:4:10: 'sped_kmh' is not a field of driver" in result.stderr
+    assert "error: late.yaml:5:" in result.stderr
+    assert "error: torn.yaml:" in result.stderr
+    assert not Path("results").exists()
+    assert [one["exit_code"] for one in json.loads(result.stdout)] == [0, 2, 2, 2]
+
+
+# ---------------------------------------------------------------- without processes
+
+
+def test_a_folder_stands_for_the_scenarios_below_it(tmp_path: Path) -> None:
+    inner = tmp_path / "b"
+    inner.mkdir()
+    first, second = write_scenario(tmp_path, name="z"), write_scenario(inner, name="a")
+    (tmp_path / "other.yaml").write_text("a: 1\n")
+    (tmp_path / "torn.yaml").write_text("a: [\n")
+    (tmp_path / "notes.txt").write_text("road: x\n")
+    found, others = find_scenarios([tmp_path, first])
+    assert found == [second, tmp_path / "torn.yaml", first]
+    assert others == [tmp_path / "other.yaml"]
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(InputError, match="there is no scenario in the folder"):
+        find_scenarios([empty])
+
+
+def test_two_scenarios_must_not_share_a_folder(tmp_path: Path) -> None:
+    files = [tmp_path / "x" / "a.yaml", tmp_path / "y" / "a.yaml", tmp_path / "b.yaml"]
+    with pytest.raises(InputError, match=r"would both write to '.*a'; rename one"):
+        plan(files, tmp_path / "results")
+    jobs = plan(
+        files[1:], tmp_path / "results", [("a=1", "--set a=1"), ("duration=3", "--duration 3")]
+    )
+    assert [job.output_dir.name for job in jobs] == ["a", "b"]
+    assert jobs[1].command == f"cosim run {tmp_path / 'b.yaml'} --set a=1 --duration 3"
+
+
+def test_the_table_tells_passed_failed_and_no_limits() -> None:
+    def metrics(*passed: bool) -> dict[str, Any]:
+        limits = [{"run": "passive", "passed": one} for one in passed]
+        return {"runs": {"passive": {"simulated_s": 3.0}}, "limits": limits}
+
+    table = batch_table(
+        [
+            ("a", 0, metrics(True)),
+            ("b", 1, metrics(True, False)),
+            ("c", 0, metrics()),
+            ("d", 3, None),
+        ]
+    )
+    assert [row[1] for row in table.rows] == ["passed", "FAILED", "no limits", "error"]
+    assert table.rows[0][2:4] == ("3.0", "-")
+
+
+def test_threads_are_the_same_in_every_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else sums of a run alone could come out in another order than in a batch."""
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    assert cosim("gone.yaml").exit_code == 2
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+
+
+def test_a_scenario_that_is_gone_is_no_crash(tmp_path: Path) -> None:
+    """It was there when the files were looked for."""
+    job = Job(tmp_path / "gone.yaml", tmp_path / "results")
+    ended, were_run = run_all([job], 1)
+    assert not were_run
+    assert ended == [Ended(job, 2, ended[0].problems)]
+    assert "no such scenario file" in ended[0].problems[0]
