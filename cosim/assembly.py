@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from cosim import loop
 from cosim.comfort import ride_figures
@@ -31,8 +30,6 @@ from cosim.start import builtin_start, checked_parameters
 from cosim.vehicle import RECORDED, Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
 from sensor import OUTPUTS, SAMPLE_RATE_HZ, OnnxSensor, SensorError, default_model
-
-Array = npt.NDArray[np.float64]
 
 STEP_S: Final = 1 / SAMPLE_RATE_HZ
 SETTLING_S: Final = 2.0  # left out of the ride figures: the road's unevenness is still fading in
