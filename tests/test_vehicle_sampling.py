@@ -125,7 +125,7 @@ def test_picture_of_spectra(plots: Path) -> None:
         "Channels at 1 kHz: amplitude spectra on class C at 50 km/h and on cobblestones at "
         "30 km/h; dashed behind the IMU's low-pass. Grey: beyond what 100 Hz can show."
     )
-    panels = (("Car.az", "m/s²"), ("Car.PitchVel", "rad/s"), ("Car.vFL", "m/s"))
+    panels = (("Car.ax", "m/s²"), ("Car.az", "m/s²"), ("Car.vFL", "m/s"))
     with picture(plots, SECTION, "sampling", caption, ncols=3, figsize=(11, 3.6)) as (_, axes):
         for ax, (name, unit) in zip(axes, panels, strict=True):
             for k, surface in enumerate(SURFACES):
