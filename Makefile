@@ -59,6 +59,11 @@ figures: $(VENV)/test.stamp ## nine laps on two surfaces: docs/laps.md and the m
 	$(BIN)/python -m sensor.model_card --model sensor/models/bilstm_w19.onnx \
 	    --training sensor/models/bilstm_w19.json --figures build/figures.json
 
+roads: $(VENV)/test.stamp ## surfaces, bumpy road and road scenarios: the tables of docs/roads.md (about four minutes)
+	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/surfaces.py
+	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/bumps.py
+	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/road_scenarios.py
+
 benchmarks: $(VENV)/test.stamp ## real-time factors and loop overhead, beside FMPy's simulate_fmu
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/bench_loop.py
 	$(BIN)/python tests/benchmarks/bench_sensor.py

@@ -88,9 +88,10 @@ def batch(ended: Sequence[Ended]) -> None:
     from cosim.tables import batch_table
 
     table(batch_table([(str(one.job.scenario), one.exit_code, one.metrics) for one in ended]))
-    notes = dict.fromkeys(note for one in ended for note in one.notes)
-    for note in notes:
-        click.echo(f"note: {note}", err=True)
+    for note in dict.fromkeys(note for one in ended for note in one.notes):
+        files = [str(one.job.scenario) for one in ended if note in one.notes]
+        where = files[0] if len(files) == 1 else f"{len(files)} scenarios"
+        click.echo(f"note: {where}: {note}", err=True)
     problems(ended)
     wrong = sum(one.exit_code != 0 for one in ended)
     folder = ended[0].job.output_dir.parent
