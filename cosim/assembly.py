@@ -112,7 +112,7 @@ def assemble(
     `InputError` with everything wrong in the scenario, `FmuError` or `NetworkError` for a file that
     does not load.
     """
-    wiring, description, course, plan = _checked(scenario)
+    wiring, description, course, plan = checked(scenario)
     network = None
     if sensor is None:
         network = _network(scenario)
@@ -155,9 +155,9 @@ def record_groups() -> list[tuple[str, list[Signal]]]:
     ]
 
 
-def _checked(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan]:
+def checked(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan]:
     """Return the vehicle FMU, its wiring, the course and what is driven on it, after all that can
-    be wrong was looked for.
+    be wrong was looked for; raises `InputError` with every problem.
     """
     settings = scenario.vehicle
     own = settings.fmu == "builtin"
@@ -266,4 +266,4 @@ def _comfort(recorder: Recorder) -> dict[str, float]:
     return ride_figures(seat, travel, load, SAMPLE_RATE_HZ)
 
 
-__all__ = ["Assembly", "RunResult", "assemble", "record_groups"]
+__all__ = ["Assembly", "RunResult", "assemble", "checked", "record_groups"]

@@ -130,6 +130,18 @@ def check(fmus: tuple[Path, ...], as_json: bool, static: bool, timeout: float) -
     sys.exit(code)
 
 
+@main.command()
+@click.argument("path", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print the facts as JSON on stdout.")
+@click.option("--all", "every", is_flag=True, help="Show long lists of variables in full.")
+def inspect(path: Path, as_json: bool, every: bool) -> None:
+    """Show what is inside PATH: an FMU, an ONNX network, a scenario or an OpenCRG road."""
+    with _failures_as_exit_codes():
+        from cosim.inspect.command import run as run_inspection
+
+        run_inspection(path, as_json, every)
+
+
 def _run_one(
     scenario: str, overrides: Sequence[tuple[str, str]], output_dir: Path | None, as_json: bool
 ) -> int:
@@ -193,6 +205,8 @@ def _failures_as_exit_codes() -> Iterator[None]:
         for problem in getattr(error, "problems", (error,)):
             click.echo(f"error: {problem}", err=True)
         sys.exit(error.exit_code)
+    except BrokenPipeError:
+        raise  # whoever read the output has seen enough; click ends quietly
     except OSError as error:
         where = f"'{error.filename}': " if error.filename else ""
         click.echo(f"error: {where}{error.strerror or error}", err=True)
