@@ -95,7 +95,7 @@ def check(scenario: Scenario) -> float:
     Returns the simulated time that a run of it may take [s]. Raises `InputError` with everything
     wrong, `FmuError` or `NetworkError` for a file that does not load.
     """
-    *_, plan = _checked(scenario)
+    *_, plan = checked_parts(scenario)
     _network(scenario)
     return _steps(scenario, plan)[0] * STEP_S
 
@@ -112,7 +112,7 @@ def assemble(
     `InputError` with everything wrong in the scenario, `FmuError` or `NetworkError` for a file that
     does not load.
     """
-    wiring, description, course, plan = checked(scenario)
+    wiring, description, course, plan = checked_parts(scenario)
     network = None
     if sensor is None:
         network = _network(scenario)
@@ -155,7 +155,7 @@ def record_groups() -> list[tuple[str, list[Signal]]]:
     ]
 
 
-def checked(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan]:
+def checked_parts(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan]:
     """Return the vehicle FMU, its wiring, the course and what is driven on it, after all that can
     be wrong was looked for; raises `InputError` with every problem.
     """
@@ -266,4 +266,4 @@ def _comfort(recorder: Recorder) -> dict[str, float]:
     return ride_figures(seat, travel, load, SAMPLE_RATE_HZ)
 
 
-__all__ = ["Assembly", "RunResult", "assemble", "checked", "record_groups"]
+__all__ = ["Assembly", "RunResult", "assemble", "checked_parts", "record_groups"]

@@ -76,7 +76,7 @@ def _spectrum(lines: Floats, step: float, size: int) -> tuple[Floats, Floats]:
         total += (np.abs(np.fft.rfft(part * window, axis=1)) ** 2).mean(axis=0)
     density = 2.0 * total * step / (len(starts) * (window @ window))
     density[0] *= 0.5
-    return np.fft.rfftfreq(size, step), density
+    return np.asarray(np.fft.rfftfreq(size, step)), density
 
 
 def _bands(

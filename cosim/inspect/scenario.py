@@ -23,11 +23,11 @@ def inspect(path: Path) -> Facts:
 
     Raises `InputError` with everything wrong in it, as `cosim run` would.
     """
-    from cosim.assembly import STEP_S, checked
+    from cosim.assembly import STEP_S, checked_parts
     from cosim.scenario.load import load
 
     scenario = load(path)
-    _, description, course, plan = checked(scenario)
+    _, description, course, plan = checked_parts(scenario)
     values = [*_resolved(scenario, description), *_parameters(scenario, description)]
     wanted = None if scenario.duration == "lap" else float(scenario.duration)
     expected = plan.expected_s if wanted is None else min(wanted, plan.expected_s)
