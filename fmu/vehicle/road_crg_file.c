@@ -1,11 +1,15 @@
 /* Reading an OpenCRG file: bytes, header, records; messages and numbers. */
 #include "road_crg_file.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef _WIN32
+#include <windows.h>
+#endif
 
 enum { DEEPEST_REFERENCE = 4 };
 
@@ -112,9 +116,20 @@ bool crg_number(const char *text, size_t size, double *value)
     return isfinite(*value);
 }
 
+/* `path` is UTF-8, as FMI has it. */
+static FILE *open_file(const char *path)
+{
+#ifdef _WIN32
+    wchar_t wide[PATH_SIZE];
+    return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, PATH_SIZE) ? _wfopen(wide, L"rb") : NULL;
+#else
+    return fopen(path, "rb");
+#endif
+}
+
 static char *read_bytes(CrgFile *file, const char *path, size_t *size)
 {
-    FILE *stream = fopen(path, "rb");
+    FILE *stream = open_file(path);
     char *bytes = NULL;
     long length = -1;
 
@@ -124,7 +139,7 @@ static char *read_bytes(CrgFile *file, const char *path, size_t *size)
     }
     if (fseek(stream, 0, SEEK_END) == 0)
         length = ftell(stream);
-    if (length >= 0 && length < 0x7fffffffffffL && fseek(stream, 0, SEEK_SET) == 0)
+    if (length >= 0 && length < LONG_MAX && fseek(stream, 0, SEEK_SET) == 0)
         bytes = malloc((size_t)length + 1);
     if (bytes && fread(bytes, 1, (size_t)length, stream) != (size_t)length) {
         free(bytes);
