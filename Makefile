@@ -7,7 +7,7 @@ SCENARIO ?= scenarios/laps/hockenheim_normal_class_a.yaml
 DATA ?= data/paper
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
-.PHONY: demo test check fmu dataset train validation figures benchmarks sanitize clean
+.PHONY: demo test check fmu cross dataset train validation figures benchmarks sanitize clean
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(SCENARIO)
@@ -37,6 +37,10 @@ check: $(VENV)/test.stamp ## formatting
 
 fmu: $(VENV)/demo.stamp ## rebuild the FMUs after a change of the C sources
 	$(BIN)/python fmu/build.py
+
+cross: $(VENV)/demo.stamp ## FMUs with binaries for Linux, Windows and macOS in dist/ (the first time some ten minutes)
+	$(BIN)/python -m pip install --quiet -e '.[cross]'
+	$(BIN)/python fmu/cross.py
 
 sanitize: $(VENV)/test.stamp ## AddressSanitizer, UBSan and leak check over 50 lives of the vehicle FMU
 	$(BIN)/python fmu/build.py --sanitize

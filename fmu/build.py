@@ -276,8 +276,8 @@ def build_road_reader(out: Path, cc: str | None = None, cflags: str = "") -> Pat
     return part.replace(out / ROAD_READER)
 
 
-def sanitize(model: Path, out: Path, cc: str | None = None, cflags: str = "") -> list[Path]:
-    """Programs of ``smoke.c`` and the model with the address and undefined-behaviour sanitizers."""
+def smoke_programs(model: Path, out: Path, cc: str | None, flags: list[str]) -> list[Path]:
+    """Programs of ``smoke.c`` and the model, for FMI 2 and 3."""
     table = read_table(model / "variables.toml")
     sources = {**all_sources(model, table, 2), **all_sources(model, table, 3)}
     smoke = (FMU_DIRECTORY / "smoke.c").read_bytes()
@@ -285,12 +285,17 @@ def sanitize(model: Path, out: Path, cc: str | None = None, cflags: str = "") ->
         sources[f"smoke{fmi}.c"] = f'#define SMOKE_FMI {fmi}\n#line 1 "smoke.c"\n'.encode() + smoke
     out.mkdir(parents=True, exist_ok=True)
     programs = []
-    for fmi, content in link(compiler(cc), [*SANITIZE, *shlex.split(cflags)], sources, []).items():
+    for fmi, content in link(compiler(cc), flags, sources, []).items():
         program = out / f"{table.model['identifier']}.fmi{fmi}.smoke"
         program.write_bytes(content)
         program.chmod(0o755)
         programs.append(program)
     return programs
+
+
+def sanitize(model: Path, out: Path, cc: str | None = None, cflags: str = "") -> list[Path]:
+    """The smoke programs with the address and undefined-behaviour sanitizers."""
+    return smoke_programs(model, out, cc, [*SANITIZE, *shlex.split(cflags)])
 
 
 def model_folder(name: str) -> Path:
@@ -315,7 +320,7 @@ def arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--sanitize", action="store_true", help="build and run the smoke test instead"
     )
-    parser.add_argument("settings", nargs="*", help="with --sanitize: Name=text, string parameters")
+    parser.add_argument("settings", nargs="*", help="with --sanitize: Name=value, start values")
     return parser.parse_args(argv)
 
 

@@ -1,0 +1,123 @@
+"""FMUs for all platforms from this one: ``python fmu/cross.py [--model vehicle] [--out dist]``.
+
+Clang and the C libraries of every target come with the ``ziglang`` wheel (extra ``cross``). What
+was compiled before is kept in build/cross until the sources change. Where wine or qemu-user is
+installed, the smoke test runs on the foreign platform and must give the figures of this one.
+"""
+
+import argparse
+import importlib.util
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+from variables import TableError
+
+import build
+
+CACHE = build.FMU_DIRECTORY.parent / "build" / "cross"
+TARGETS = {  # FMI 3 platform: Zig's target
+    "x86_64-linux": "x86_64-linux-gnu.2.17",
+    "aarch64-linux": "aarch64-linux-gnu.2.17",
+    "x86_64-windows": "x86_64-windows-gnu",
+    "x86_64-darwin": "x86_64-macos",
+    "aarch64-darwin": "aarch64-macos",
+}
+FMI2_PLATFORMS = ("x86_64-linux", "x86_64-windows", "x86_64-darwin")  # FMI 2.0 names no others
+EMULATORS = {  # platform: static target of the smoke test, commands that may run it
+    "aarch64-linux": ("aarch64-linux-musl", ("qemu-aarch64", "qemu-aarch64-static")),
+    "x86_64-windows": ("x86_64-windows-gnu", ("wine64", "wine")),
+}
+MOVING = ["Init.Velocity=20", "DM.Gas=0.3", "DM.Steer.Ang=0.5"]  # what the smoke test drives
+
+
+def zig(target: str) -> str:
+    """The C compiler for a target."""
+    if importlib.util.find_spec("ziglang") is None:
+        raise build.BuildError(
+            "Cross compilation needs Zig: pip install 'suspension-cosim[cross]' (or: ziglang)."
+        )
+    return f"{sys.executable} -m ziglang cc -target {target}"
+
+
+def compiled(model: Path, platform: str) -> list[Path]:
+    """FMUs of one platform, from the cache if its sources are the same."""
+    folder = CACHE / build.instantiation_token(model).strip("{}") / platform
+    known = sorted(folder.glob("*.fmu"))
+    if len(known) == len(build.VERSIONS):
+        return known
+    print(f"{platform}: compiling", flush=True)
+    with tempfile.TemporaryDirectory() as name:
+        paths = build.build(model, Path(name), zig(TARGETS[platform]), target=platform)
+        folder.mkdir(parents=True, exist_ok=True)
+        return [Path(shutil.copy2(path, folder / path.name)) for path in paths]
+
+
+def merge(own: Path, others: list[Path], out: Path) -> Path:
+    """The FMU ``own`` with the binaries of ``others``, which are the same FMU elsewhere."""
+    with zipfile.ZipFile(own) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    for other in others:
+        with zipfile.ZipFile(other) as archive:
+            for name in archive.namelist():
+                if name.startswith("binaries/"):
+                    files.setdefault(name, archive.read(name))
+    out.mkdir(parents=True, exist_ok=True)
+    build.write_zip(out / own.name, files)
+    return out / own.name
+
+
+def smoke(model: Path, compiler: str | None, emulator: list[str]) -> str:
+    """What the smoke test says, FMI 2 and 3, on the machine that ``emulator`` runs."""
+    flags = [*build.FLAGS, "-static"] if emulator else build.FLAGS
+    with tempfile.TemporaryDirectory() as name:
+        said = []
+        for program in build.smoke_programs(model, Path(name), compiler, flags):
+            command = [*emulator, str(program), *MOVING]
+            result = subprocess.run(command, capture_output=True, text=True, check=False)
+            if result.returncode != 0:
+                raise build.BuildError(f"{' '.join(emulator)}: {result.stderr.strip()}")
+            said.append(result.stdout.strip())
+        return "\n".join(said)
+
+
+def try_out(model: Path) -> None:
+    """Run the smoke test here and wherever an emulator is installed; BuildError if they differ."""
+    here = smoke(model, None, [])
+    print(f"here: {here}")
+    for platform, (target, names) in EMULATORS.items():
+        found = next((path for name in names if (path := shutil.which(name))), None)
+        if found is None:
+            print(f"{platform}: not tried out, {' and '.join(names)} are not installed")
+            continue
+        there = smoke(model, zig(target), [found])
+        if there != here:
+            raise build.BuildError(f"{platform} gives other figures:\n{there}")
+        print(f"{platform}: the same")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    parser = argparse.ArgumentParser(description="FMUs with binaries for every platform.")
+    parser.add_argument("--model", default="vehicle", help="folder of fmu/, or a path")
+    parser.add_argument("--out", type=Path, default=build.FMU_DIRECTORY.parent / "dist")
+    options = parser.parse_args(argv)
+    try:
+        model = build.model_folder(options.model)
+        fmus = {platform: compiled(model, platform) for platform in TARGETS}
+        for index, fmi in enumerate(build.VERSIONS):
+            platforms = FMI2_PLATFORMS if fmi == 2 else tuple(TARGETS)
+            first, *others = [fmus[platform][index] for platform in platforms]
+            print(merge(first, others, options.out))
+        try_out(model)
+    except (build.BuildError, TableError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
