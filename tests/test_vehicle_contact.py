@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from gates import at_least, between, gate
 from scipy import signal
-from validation_plots import picture
-from vehicle_rig import CORNERS, STEER, Array, Cruise, Record, Rig, parameter, run, straight_track
+from validation_plots import log_bands, picture
+from vehicle_rig import STEER, Array, Cruise, Record, Rig, parameter, run, straight_track
 
 from cosim.fmi import Value
 from cosim.road import Iso8608, build_road
@@ -89,11 +89,10 @@ def test_picture_of_spectra(plots: Path) -> None:
     with picture(plots, SECTION, "road_spectra", caption, figsize=(6, 4)) as (_, ax):
         for k, kind in enumerate("ABCD"):
             n, power = densities(ride(kind, 120.0))
-            near = (n > 0.02) & (n < 8.0)
-            for i in range(len(CORNERS)):
-                ax.loglog(n[near], power[near, i], f"C{k}", lw=0.5)
-            mean = ROUGHNESS[kind] * (n[near] / 0.1) ** -2.0
-            ax.loglog(n[near], mean, "k--", lw=0.9)
+            at, values = log_bands(n, power, 0.02, 8.0, 60)
+            ax.loglog(at, values, f"C{k}", lw=0.8)
+            mean = ROUGHNESS[kind] * (at / 0.1) ** -2.0
+            ax.loglog(at, mean, "k--", lw=0.9)
             ax.text(8.5, mean[-1], f"class {kind}", color=f"C{k}", va="center")
         ax.set_xlim(0.02, 20.0)
         ax.set_xlabel("spatial frequency, 1/m")

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from gates import STUDIES, Study, at_most, gate
 from scipy import signal
-from validation_plots import picture
+from validation_plots import log_bands, picture
 from vehicle_rig import DAMPERS, Array, Record, Rig, run, straight_track
 
 from cosim.fmi import Value
@@ -129,11 +129,11 @@ def test_picture_of_spectra(plots: Path) -> None:
     with picture(plots, SECTION, "sampling", caption, ncols=3, figsize=(11, 3.6)) as (_, axes):
         for ax, (name, unit) in zip(axes, panels, strict=True):
             for k, surface in enumerate(SURFACES):
-                f, power = spectrum(ride(surface)[name])
-                ax.loglog(f[1:], np.sqrt(power[1:]), f"C{k}", label=surface)
+                f, power = log_bands(*spectrum(ride(surface)[name]), 0.4, 500.0)
+                ax.loglog(f, np.sqrt(power), f"C{k}", label=surface)
                 if name in IMU:
-                    f, power = spectrum(ride(surface, CUTOFF)[IMU[name]])
-                    ax.loglog(f[1:], np.sqrt(power[1:]), f"C{k}--", lw=0.9)
+                    f, power = log_bands(*spectrum(ride(surface, CUTOFF)[IMU[name]]), 0.4, 500.0)
+                    ax.loglog(f, np.sqrt(power), f"C{k}--", lw=0.9)
             ax.axvspan(0.5 * RATE, 500.0, color="0.92", zorder=0)
             ax.set_title(name)
             ax.set_ylabel(f"amplitude density, ({unit})/√Hz")

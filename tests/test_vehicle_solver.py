@@ -89,7 +89,7 @@ def enter(
 
 
 def test_class_c_driven(roads: Roads) -> None:
-    enter(roads, "class C", 50.0, 6.0, drive, 0.012)
+    enter(roads, "class C", 50.0, 6.0, drive)
 
 
 @pytest.mark.parametrize("kmh", [15.0, 32.0])
@@ -99,7 +99,7 @@ def test_bumps(roads: Roads, kmh: float) -> None:
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(("road", "kmh", "most"), [("class C", 80.0, 0.02), ("bumps", 25.0, 0.01)])
+@pytest.mark.parametrize(("road", "kmh", "most"), [("class C", 80.0, 0.015), ("bumps", 25.0, 0.01)])
 def test_other_speeds(roads: Roads, road: str, kmh: float, most: float) -> None:
     enter(roads, road, kmh, 4.0, dampers, most)
 

@@ -7,7 +7,24 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from gates import PLOTS, SECTIONS, Plot
+
+Array = npt.NDArray[np.float64]
+
+
+def log_bands(f: Array, power: Array, low: float, high: float, count: int = 120) -> tuple[Any, Any]:
+    """Means of a spectrum (n, ...) in logarithmic bands: centres and values, empty bands left out.
+
+    Spectra of thousands of lines are noise to the eye and large as files.
+    """
+    edges = np.geomspace(low, high, count + 1)
+    place = np.digitize(f, edges) - 1
+    used = [k for k in range(count) if (place == k).any()]
+    values = np.array([power[place == k].mean(axis=0) for k in used])
+    return np.array([f[place == k].mean() for k in used]), values
+
 
 STYLE = {
     "svg.hashsalt": "suspension-cosim", "font.size": 9.0, "axes.grid": True, "grid.alpha": 0.3,
