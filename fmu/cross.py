@@ -29,7 +29,7 @@ TARGETS = {  # FMI 3 platform: Zig's target
 FMI2_PLATFORMS = ("x86_64-linux", "x86_64-windows", "x86_64-darwin")  # FMI 2.0 names no others
 EMULATORS = {  # platform: static target of the smoke test, commands that may run it
     "aarch64-linux": ("aarch64-linux-musl", ("qemu-aarch64", "qemu-aarch64-static")),
-    "x86_64-windows": ("x86_64-windows-gnu", ("wine64", "wine")),
+    "x86_64-windows": ("x86_64-windows-gnu", ("wine64", "wine", "/usr/lib/wine/wine64")),
 }
 MOVING = ["Init.Velocity=20", "DM.Gas=0.3", "DM.Steer.Ang=0.5"]  # what the smoke test drives
 
