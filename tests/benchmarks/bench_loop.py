@@ -80,7 +80,8 @@ def lap() -> tuple[dict[str, Any], npt.NDArray[np.float64]]:
     assembly.run(None)
     course = course_of(scenario)
     speed = speed_profile(course.track, STYLES[scenario.driver.style])
-    start = builtin_start(course, float(speed[np.searchsorted(course.track.s, 0.0)]), True, None)
+    speed_0 = float(speed[np.searchsorted(course.track.s, 0.0)])
+    start = builtin_start(course, course.track, speed_0, True, None)
     groups = [assembly.recorder.group(name) for name in ("driver", "command")]
     return start, np.hstack(groups)[:STEPS].copy()
 
