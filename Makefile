@@ -7,7 +7,7 @@ SCENARIO ?= scenarios/laps/hockenheim_normal_class_a.yaml
 DATA ?= data/paper
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
-.PHONY: demo test check fmu cross dataset train validation figures benchmarks sanitize clean
+.PHONY: demo test check fmu cross dataset train validation figures roads benchmarks sanitize clean
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(SCENARIO)
