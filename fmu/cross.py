@@ -14,9 +14,8 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-from variables import TableError
-
 import build
+from variables import TableError
 
 CACHE = build.FMU_DIRECTORY.parent / "build" / "cross"
 TARGETS = {  # FMI 3 platform: Zig's target
