@@ -100,12 +100,15 @@ def batch(ended: Sequence[Ended]) -> None:
 
 
 def problems(ended: Sequence[Ended]) -> None:
-    """Say on stderr what went wrong with each scenario, its file first."""
+    """Say on stderr what went wrong with each scenario, its file first; a wrong option once."""
+    said: dict[str, None] = {}
     for one in ended:
         file = str(one.job.scenario)
         for problem in one.problems:
-            words = problem if problem.startswith(file) else f"{file}: {problem}"
-            click.echo(f"error: {words}", err=True)
+            named = problem.startswith((file, "--set ", "--duration "))
+            said[problem if named else f"{file}: {problem}"] = None
+    for words in said:
+        click.echo(f"error: {words}", err=True)
 
 
 def table(shown: Table) -> None:

@@ -149,6 +149,18 @@ def test_problems_of_all_come_before_the_first_step_of_any(
     assert [one["exit_code"] for one in json.loads(result.stdout)] == [0, 2, 2, 2]
 
 
+def test_a_wrong_override_is_said_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b"):
+        write_scenario(tmp_path, name=name)
+    result = cosim(".", "--jobs", "1", "--set", "road.surfce=A")
+    assert result.exit_code == 2
+    assert result.stderr.count("'surfce' is not a field of road; did you mean 'surface'?") == 1
+    assert "did you mean 'b.yaml'?" in cosim("bb.yaml").stderr
+    (tmp_path / "road").mkdir()
+    assert "did you mean 'road'?" in cosim("roda").stderr
+
+
 # ---------------------------------------------------------------- without processes
 
 

@@ -97,7 +97,8 @@ def read(
 
 def _text(path: Path) -> str:
     if not path.exists():
-        beside = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+        near = path.parent.iterdir() if path.parent.is_dir() else ()
+        beside = [p.name for p in near if p.is_dir() or p.suffix in (".yaml", ".yml")]
         match = nearest(path.name, beside)
         hint = f"; did you mean '{path.parent / match}'?" if match else ""
         raise InputError(f"{path}: no such scenario file{hint}")
