@@ -45,3 +45,12 @@ def _road_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COSIM_CACHE_DIR", str(tmp_path_factory.mktemp("roads")))
         yield
+
+
+@pytest.fixture(scope="session")
+def lag_fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """The small model of tests/fmu_fixture as an FMU of FMI 2.0 and of FMI 3.0, built once."""
+    from fmu_face import FIXTURE, build
+
+    paths = build.build(FIXTURE, tmp_path_factory.mktemp("lag"))
+    return dict(zip((2, 3), paths, strict=True))

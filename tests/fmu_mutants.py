@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
 import xml.etree.ElementTree as ET
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 Edit = Callable[[ET.Element], None]
@@ -109,18 +108,3 @@ def add_unit(name: str, **base: str) -> Edit:
 def version_of(root: ET.Element) -> int:
     """Return 2 or 3."""
     return int(str(root.get("fmiVersion"))[0])
-
-
-def patched(
-    sources: Mapping[str, bytes], changes: Sequence[tuple[str, str, str]]
-) -> dict[str, bytes]:
-    """Return C sources after replacements (file, pattern, text); each pattern must be there.
-
-    A change to a file of the other FMI version is passed over.
-    """
-    result = {name: content.decode() for name, content in sources.items()}
-    for name, old, new in changes:
-        if name in result:
-            assert re.search(old, result[name]), (name, old)
-            result[name] = re.sub(old, new.replace("\\", r"\\"), result[name], count=1)
-    return {name: text.encode() for name, text in result.items()}

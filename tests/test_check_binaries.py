@@ -12,7 +12,7 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from fmu_face import FIXTURE, build
+from fmu_face import build
 from fmu_mutants import mutate
 
 from cosim.check.binaries import here, meaning
@@ -22,14 +22,13 @@ from cosim.check.shared_library import LibraryError, read_library
 from cosim.check.symbols import required, standard_functions
 
 LINUX_ONLY = pytest.mark.skipif(sys.platform != "linux", reason="compiles ELF libraries")
-PLACE = {2: "binaries/linux64/lag.so", 3: "binaries/x86_64-linux/lag.so"}
+PLACE = {v: build.binary_path("lag", v, build.target_platform()) for v in (2, 3)}
 LOGGING = Path(fmpy.__file__).parent / "logging"
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
-    out = tmp_path_factory.mktemp("fmus")
-    return dict(zip((2, 3), build.build(FIXTURE, out, target="x86_64-linux"), strict=True))
+def fmus(lag_fmus: dict[int, Path]) -> dict[int, Path]:
+    return lag_fmus
 
 
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])

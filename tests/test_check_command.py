@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from fmu_face import FIXTURE, ROOT, build
+from fmu_face import ROOT
 from fmu_mutants import MODEL, mutate, put, put_outer
 
 from cosim.check.codes import as_markdown
@@ -17,8 +17,8 @@ from cosim.cli import main
 
 
 @pytest.fixture(scope="module")
-def lag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build.build(FIXTURE, tmp_path_factory.mktemp("fmus"))[0]
+def lag(lag_fmus: dict[int, Path]) -> Path:
+    return lag_fmus[2]
 
 
 def typed(*words: object) -> Result:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from fmu_face import FIXTURE, ROOT, build
+from fmu_face import ROOT, build
 from fmu_mutants import (
     MODEL,
     Edit,
@@ -33,15 +33,14 @@ from cosim.check.codes import CODES
 from cosim.check.finding import Report
 from cosim.errors import InputError
 
-BINARY = {2: "binaries/linux64/lag.so", 3: "binaries/x86_64-linux/lag.so"}
+BINARY = {v: build.binary_path("lag", v, build.target_platform()) for v in (2, 3)}
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 BUILD = "sources/buildDescription.xml"
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
-    out = tmp_path_factory.mktemp("fmus")
-    return dict(zip((2, 3), build.build(FIXTURE, out, target="x86_64-linux"), strict=True))
+def fmus(lag_fmus: dict[int, Path]) -> dict[int, Path]:
+    return lag_fmus
 
 
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])

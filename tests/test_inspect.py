@@ -12,7 +12,7 @@ import onnx
 import onnxruntime as ort
 import pytest
 from click.testing import CliRunner, Result
-from fmu_face import FIXTURE, ROOT, build
+from fmu_face import ROOT, build
 from fmu_mutants import MODEL, add_unit, mutate, put, typed, variable
 
 from cosim.cli import main
@@ -29,9 +29,8 @@ needs_vehicle = pytest.mark.skipif(not VEHICLE.is_file(), reason="the vehicle FM
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
-    out = tmp_path_factory.mktemp("fmus")
-    return dict(zip((2, 3), build.build(FIXTURE, out, target="x86_64-linux"), strict=True))
+def fmus(lag_fmus: dict[int, Path]) -> dict[int, Path]:
+    return lag_fmus
 
 
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
@@ -119,7 +118,8 @@ def test_an_fmu(lag: Path) -> None:
     d = facts.data
     version = d["fmi_version"][0]
     assert (d["model_name"], d["model_identifier"], d["license"]) == ("Lag", "lag", "MIT")
-    assert d["platforms"] == ["linux64" if version == "2" else "x86_64-linux"]
+    place = build.binary_path("lag", int(version), build.target_platform())
+    assert d["platforms"] == [place.split("/")[1]]
     assert d["counts"]["parameter"] == 9
     assert (d["counts"]["input"], d["counts"]["output"]) == (2, 6)
     by_name = {v["name"]: v for v in d["variables"]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
 import signal
@@ -18,6 +19,7 @@ from cosim.check.trials.journal import new_journal, read_journal
 from cosim.errors import CosimError
 
 _LOOK: Final = 0.1  # s between two looks at the journal
+_START: Final = 60.0  # s that a fresh Python may take on a busy machine
 _MEANINGS: Final = {
     "SIGSEGV": "SIGSEGV, memory that is not its own", "SIGABRT": "SIGABRT, it gave up",
     "SIGFPE": "SIGFPE, a wrong calculation", "SIGILL": "SIGILL, a wrong instruction",
@@ -84,9 +86,29 @@ class Children:
     def _watch(self, job: Path, journal: Path) -> tuple[int, bool]:
         """Send a job; return the exit code and whether it had to be killed."""
         server = self._serving()
-        cast(IO[str], server.stdin).write(f"{job}\n")
-        cast(IO[str], server.stdin).flush()
-        child = int(self._lines.get(timeout=60.0) or 0)
+        with contextlib.suppress(OSError):  # it has ended; that there is no answer tells
+            cast(IO[str], server.stdin).write(f"{job}\n")
+            cast(IO[str], server.stdin).flush()
+        trial = self._started()
+        try:
+            return self._until_its_end(trial, journal)
+        except BaseException:
+            _kill(trial)
+            raise
+
+    def _started(self) -> int:
+        """Return the process id of the trial that has just been sent."""
+        try:
+            line = self._lines.get(timeout=_START)
+        except queue.Empty:
+            line = ""
+        if not line:
+            code = self._drop(kill=True)
+            raise CheckerError(f"the process of the trials did not start (exit code {code})")
+        return int(line)
+
+    def _until_its_end(self, trial: int, journal: Path) -> tuple[int, bool]:
+        """Return the exit code of a trial and whether it had to be killed."""
         calls, since = -1, time.monotonic()
         while True:
             try:
@@ -96,7 +118,7 @@ class Children:
                 if now != calls:
                     calls, since = now, time.monotonic()
                 elif time.monotonic() - since > self._timeout:
-                    _kill(child)
+                    _kill(trial)
                     self._drop(kill=False, patience=10.0)
                     return -1, True
                 continue
@@ -123,7 +145,8 @@ class Children:
         server, self._server = self._server, None
         if server is None:
             return 0
-        cast(IO[str], server.stdin).close()
+        with contextlib.suppress(OSError):
+            cast(IO[str], server.stdin).close()
         if kill:
             server.kill()
         try:
@@ -142,11 +165,11 @@ def _read(server: subprocess.Popen[str], lines: queue.Queue[str]) -> None:
 
 
 def _kill(child: int) -> None:
-    """End a trial and whatever it has started."""
-    if hasattr(os, "killpg"):
-        os.killpg(child, signal.SIGKILL)
-    else:
-        os.kill(child, signal.SIGTERM)
+    """End a trial and whatever it has started, if it still is there."""
+    for end in (getattr(os, "killpg", os.kill), os.kill):
+        with contextlib.suppress(ProcessLookupError):
+            end(child, getattr(signal, "SIGKILL", signal.SIGTERM))
+            return
 
 
 def _environment() -> dict[str, str]:

@@ -239,7 +239,7 @@ def _types(description: Description) -> Iterator[Finding]:
 
 def _descriptions(description: Description) -> Iterator[Finding]:
     bare = [v for v in description.variables if not v.description.strip()]
-    public = [v for v in bare if v.causality != "local"]
+    public = [v for v in bare if v.causality not in ("local", "independent")]
     if public:
         yield Finding(
             "description-missing", place(public[0]),
