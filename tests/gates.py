@@ -37,6 +37,7 @@ Written by `make validation`; each line is an assertion of a test in `tests/test
 `tests/test_road_*.py`, and the command fails if one does not hold. Where a line shows several
 numbers, they stand in the order FL FR RL RR, front and rear, or as its text says, and the
 tolerance holds for each. Round-off figures (below 1e-10) differ from machine to machine.
+One part alone: `pytest tests/test_vehicle_steering.py --validation out`.
 What the model leaves out, and what that means for a reader: [left-out.md](left-out.md).
 Speed: [performance.md](../performance.md).
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gates import at_most, gate
 from plant_probe import Array, Probe
 from scipy.interpolate import PchipInterpolator
 
@@ -36,7 +37,9 @@ def curve(plant: Probe, name: str, at: Array) -> Array:
 @pytest.mark.parametrize("name", NAMES)
 def test_table_points_are_hit_exactly(plant: Probe, name: str) -> None:
     x, y = points(name)
-    assert curve(plant, name, x).tolist() == y.tolist()
+    off = float(np.abs(curve(plant, name, x) - y).max())
+    check = f"{name} curve at the table's points, front wheel, error [N]"
+    gate("Dampers", check, "design table", off, at_most(0.0))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -44,7 +47,9 @@ def test_inner_stretches_are_scipys_pchip(plant: Probe, name: str) -> None:
     """The last stretch at either end differs: the vehicle's ends take the secant as slope."""
     x, y = points(name)
     at = np.linspace(x[1], x[-2], 4001)
-    assert curve(plant, name, at) == pytest.approx(PchipInterpolator(x, y)(at), rel=1e-12, abs=1e-9)
+    off = float(np.abs(curve(plant, name, at) - PchipInterpolator(x, y)(at)).max())
+    gate("Dampers", f"{name} curve between the table's points, error [N]", "SciPy's PCHIP", off,
+         at_most(1e-8))  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gates import at_most, gate
 from scipy.interpolate import PchipInterpolator
 from vehicle_linear import LinearCar, per_corner
 from vehicle_rig import (
@@ -109,8 +110,9 @@ def test_valve_lag() -> None:
     record = run(0.2, {}, drive, h=0.001)
     since = record.t - 0.1
     expected = np.where(since > 0.0, 1.0 - np.exp(-since / 0.012), 0.0)
-    for c in CORNERS:
-        assert record[f"Car.Damp{c}.Ctrl"] == pytest.approx(expected, abs=1e-3)
+    off = np.abs(record.corners("Car.Damp@.Ctrl") - expected[:, None]).max(axis=0)
+    check = "valves, step of the command: position over time, error [-]"
+    gate("Dampers", check, "first-order lag of 12 ms", off, at_most(1e-3))
 
 
 def test_passive_dampers_ignore_the_command(bumps: str) -> None:
