@@ -148,7 +148,8 @@ def page() -> str:
         text += "".join(f"{g.row()}\n" for g in gates)
         text += "".join(study.markdown() for study in STUDIES if study.section == section)
         for plot in (p for p in PLOTS.values() if p.section == section):
-            text += f"\n![{plot.caption}]({plot.file})\n\n{plot.caption}\n"
+            name = plot.file.partition(".")[0].replace("_", " ")
+            text += f"\n![{name}]({plot.file})\n\n{plot.caption}\n"
     return text
 
 

@@ -79,15 +79,15 @@ class Turn:
         return float(self.t[self.yaw_rate.argmax()] - 0.5 * self.angle / WHEEL_RATE)
 
 
-def step_angle(speed: float, lateral: float) -> float:
-    """About what a lateral acceleration [m/s2] asks for, 1 deg/g of understeer assumed [rad]."""
-    return lateral * (WHEELBASE / speed**2 + np.radians(1.0) / G)
+def step_angle(speed: float, lateral: float, understeer: float) -> float:
+    """What a lateral acceleration [m/s2] asks for with an understeer gradient [deg/g], [rad]."""
+    return lateral * (WHEELBASE / speed**2 + np.radians(understeer) / G)
 
 
 @cache
-def fmu_turn(kmh: int, kind: str, lateral: float = 2.0) -> Turn:
+def fmu_turn(kmh: int, kind: str, lateral: float = 2.0, understeer: float = 1.0) -> Turn:
     speed = kmh / 3.6
-    angle = step_angle(speed, lateral)
+    angle = step_angle(speed, lateral, understeer)
 
     def drive(rig: Rig) -> None:  # the middle of each sample's ramp
         rig.inputs[STEER] = RATIO * min(angle, WHEEL_RATE * (rig.t + 0.5 * rig.h))
@@ -101,7 +101,7 @@ def fmu_turn(kmh: int, kind: str, lateral: float = 2.0) -> Turn:
 @cache
 def commonroad_turn(kmh: int) -> Turn:
     speed = kmh / 3.6
-    angle, t = step_angle(speed, 2.0), np.arange(401) * 0.01
+    angle, t = step_angle(speed, 2.0, 1.0), np.arange(401) * 0.01
     x = commonroad_car.step_steer(speed, angle, WHEEL_RATE, t)
     yaw_rate, forward = x[:, commonroad_car.YAW_RATE], x[:, commonroad_car.FORWARD]
     side_slip = x[:, commonroad_car.LATERAL] / forward
@@ -154,7 +154,7 @@ def test_step_steer_of_the_full_car_over_speed() -> None:
 
 def test_step_steer_of_iso_7401() -> None:
     """80 km/h, 4 m/s2."""
-    turn = fmu_turn(80, "full", 4.0)
+    turn = fmu_turn(80, "full", 4.0, 1.9)
     name = "ISO 7401 step steer at 80 km/h to 4 m/s2"
     car = "typical of passenger cars"
     lateral = float(turn.lateral[SETTLED].mean())
