@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SCENARIO ?= scenarios/laps/hockenheim_normal_class_a.yaml
 DATA ?= data/paper
-SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/csv/* fmu/vehicle/*)
+SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
 .PHONY: demo test check fmu cross dataset train validation figures roads benchmarks sanitize clean
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from cosim.csv_rows import csv_lines
 from cosim.errors import InputError
 
 if TYPE_CHECKING:
@@ -124,11 +123,11 @@ class Recorder:
         return path
 
     def _write_csv(self, path: Path) -> None:
-        with path.open("wb") as stream:
-            header = ",".join(signal.header for signal in self.signals)
-            stream.write(header.encode() + b"\n")
-            for lines in csv_lines(self._data[: self._rows]):
-                stream.write(lines)
+        with path.open("w", encoding="utf-8", newline="\n") as stream:
+            stream.write(",".join(signal.header for signal in self.signals) + "\n")
+            for row in self._data[: self._rows]:
+                # what repr() calls, without its detour
+                stream.write(",".join(map(float.__repr__, row.tolist())) + "\n")
 
     def _write_parquet(self, path: Path) -> None:
         require_parquet()

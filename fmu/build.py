@@ -22,7 +22,6 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import repeat
 from pathlib import Path
 
-import csv_powers
 import describe
 import generate
 import states
@@ -43,7 +42,6 @@ SANITIZE = [
     *["-Werror", "-Wno-psabi", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
 ]
 ROAD_READER = "road_crg.so"
-CSV_WRITER = "csv_rows.so"
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 NO_COMPILER = (
     "No C compiler was found: install one (Debian and Ubuntu: 'apt install gcc libc6-dev',"
@@ -266,30 +264,16 @@ def build_road_reader(out: Path, cc: str | None = None, cflags: str = "") -> Pat
     model = FMU_DIRECTORY / "vehicle"
     files = [model / "four.h", *sorted(model.glob("road_crg*.[ch]"))]
     sources = {path.name: path.read_bytes() for path in files}
-    return shared_library(ROAD_READER, sources, out, cc, cflags)
-
-
-def build_csv_writer(out: Path, cc: str | None = None, cflags: str = "") -> Path:
-    """What writes the records' numbers as text; returns its path. Raises BuildError."""
-    sources = {path.name: path.read_bytes() for path in (FMU_DIRECTORY / "csv").glob("*.c")}
-    sources["csv_powers.h"] = csv_powers.header().encode()
-    return shared_library(CSV_WRITER, sources, out, cc, cflags)
-
-
-def shared_library(
-    name: str, sources: dict[str, bytes], out: Path, cc: str | None, cflags: str
-) -> Path:
-    """Compile `sources` into the shared library `out`/`name`. Raises BuildError."""
     flags = [flag for flag in FLAGS if flag != "-fvisibility=hidden"]
     command = [*compiler(cc), *flags, *shlex.split(cflags), "-shared", *c_files(sources)]
     out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as name:
         for file, content in sources.items():
-            Path(folder, file).write_bytes(content)
-        run_compiler([*command, "-lm", "-o", name], Path(folder))
-        part = out / f".{name}.part"
-        part.write_bytes(Path(folder, name).read_bytes())
-    return part.replace(out / name)
+            Path(name, file).write_bytes(content)
+        run_compiler([*command, "-lm", "-o", ROAD_READER], Path(name))
+        part = out / f".{ROAD_READER}.part"
+        part.write_bytes(Path(name, ROAD_READER).read_bytes())
+    return part.replace(out / ROAD_READER)
 
 
 def smoke_programs(model: Path, out: Path, cc: str | None, flags: list[str]) -> list[Path]:
@@ -350,7 +334,6 @@ def main(argv: list[str] | None = None) -> int:
                 print(path)
             if model.name == "vehicle":
                 print(build_road_reader(options.out, options.cc, options.cflags))
-                print(build_csv_writer(options.out, options.cc, options.cflags))
             return 0
         with tempfile.TemporaryDirectory() as folder:
             programs = sanitize(model, Path(folder), options.cc, options.cflags)
