@@ -21,7 +21,9 @@ FMI2_PLATFORMS: Final = {
     "darwin32": ("x86", "darwin"), "darwin64": ("", "darwin"),  # of either processor
 }  # fmt: skip
 # what linkers and C++ put into every shared library
-_LINKERS: Final = re.compile(r"_init|_fini|_edata|_end|__bss_start.*|_Z.*|__.*|\..*|.*@.*")
+_LINKERS: Final = re.compile(
+    r"_init|_fini|_edata|_end|__bss_start.*|_mh_\w+_header|_Z.*|__.*|\..*|.*@.*"
+)
 
 
 def here() -> tuple[str, str]:
