@@ -15,8 +15,9 @@ from typing import Any, Final
 from cosim.check.archive import Archive
 from cosim.check.binaries import binary_for
 from cosim.check.child import CheckerError, Children, Failure
-from cosim.check.description import Description, Variable, number, whole
+from cosim.check.description import Description
 from cosim.check.finding import Finding, Report
+from cosim.check.parts import Variable, number, whole
 from cosim.check.schema import fmpy_folder
 from cosim.check.trials.job import Answer, Channel, Job
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from cosim.check.archive import MODEL_DESCRIPTION
-from cosim.check.description import Description, Unknown, Variable
+from cosim.check.description import Description
 from cosim.check.finding import Finding, listed
+from cosim.check.parts import Unknown, Variable
 
 OUTPUTS = ("Outputs", "Output")
 INITIAL_UNKNOWNS = ("InitialUnknowns", "InitialUnknown")

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from typing import Final
 
 from cosim.check.archive import MODEL_DESCRIPTION
-from cosim.check.description import Description, DisplayUnit, Unit
+from cosim.check.description import Description
 from cosim.check.finding import Finding, listed
+from cosim.check.parts import DisplayUnit, Unit
 from cosim.check.unit_names import DIMENSIONS, Exponents, Reading, readings
 from cosim.check.variables import place
 from cosim.errors import did_you_mean

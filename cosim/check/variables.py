@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from cosim.check.archive import MODEL_DESCRIPTION
-from cosim.check.description import Description, Variable, number
+from cosim.check.description import Description
 from cosim.check.finding import Finding, listed
+from cosim.check.parts import Variable, number
 
 # legal pairs of causality and variability with their values of initial; FMI 2.0.5, section 2.2.7
 _ANY: Final = ("calculated", "approx", "exact")

@@ -9,8 +9,9 @@ from typing import Any, Final
 from cosim.check.archive import MODEL_DESCRIPTION, Archive
 from cosim.check.binaries import meaning, platforms
 from cosim.check.contents import TERMINALS
-from cosim.check.description import Description, Unit, Variable
+from cosim.check.description import Description
 from cosim.check.finding import listed
+from cosim.check.parts import Unit, Variable
 from cosim.check.schema import XmlError, parse
 from cosim.check.unit_names import DIMENSIONS, readings
 from cosim.errors import InputError, did_you_mean
