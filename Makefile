@@ -3,14 +3,14 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-SCENARIO ?= scenarios/laps/hockenheim_normal_class_a.yaml
+DEMO ?= scenarios/paper/hockenheim_normal.yaml --set road.surface=A
 DATA ?= data/paper
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
 .PHONY: demo test check fmu cross dataset train validation figures roads benchmarks sanitize clean
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
-	$(BIN)/cosim run $(SCENARIO)
+	$(BIN)/cosim run $(DEMO)
 
 test: $(VENV)/test.stamp ## linters, types, and all tests
 	$(BIN)/ruff check .
@@ -58,8 +58,8 @@ train: dataset ## the published network and filter (about 25 minutes on 2 cores)
 	cp build/training/bilstm_w19.onnx sensor/models/
 	cp build/training/training.json sensor/models/bilstm_w19.json
 
-figures: $(VENV)/test.stamp ## nine laps on two surfaces: docs/laps.md and the model card (about two minutes)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/measure/laps.py
+figures: $(VENV)/test.stamp ## the paper's 29 rows on three surfaces: docs/paper-scenarios.md and the model card (about five minutes)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/measure/paper_rows.py
 	$(BIN)/python -m sensor.model_card --model sensor/models/bilstm_w19.onnx \
 	    --training sensor/models/bilstm_w19.json --figures build/figures.json
 

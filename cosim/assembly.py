@@ -18,6 +18,7 @@ from cosim.course import Course, course_of
 from cosim.driver import PathDriver
 from cosim.errors import InputError, NetworkError, Problem
 from cosim.fmi import Description, Value
+from cosim.grip import grip_figures
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.manoeuvre import Plan, manoeuvre_of, motion_of
 from cosim.manoeuvre.programme import ProgrammedDriver
@@ -38,8 +39,8 @@ LATE: Final = 1.3  # a driver this much slower than his profile has come to grie
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a run ended. `comfort` is empty where the vehicle lacks the signals, `manoeuvre` where
-    the road was followed or the manoeuvre cut short; times in s, deviation in m.
+    """How a run ended. `comfort` and `grip` are empty where the vehicle lacks the signals,
+    `manoeuvre` where the road was followed or the manoeuvre cut short; times in s, deviation in m.
     """
 
     steps_done: int
@@ -50,6 +51,7 @@ class RunResult:
     comfort: Mapping[str, float]
     largest_deviation_m: float
     manoeuvre: Mapping[str, float]
+    grip: Mapping[str, Mapping[str, float]]
 
 
 @dataclass
@@ -83,6 +85,7 @@ class Assembly:
             comfort=_comfort(self.recorder),
             largest_deviation_m=self.driver.largest_deviation,
             manoeuvre=self.plan.figures(motion_of(self.recorder)),
+            grip=grip_figures(self.recorder.group("vehicle")[:, 14:18]),
         )
 
     def _unfinished(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cosim.errors import InputError
+from cosim.scenario.surface import SurfaceName
 
 Array = npt.NDArray[np.float64]
 Dampers = Literal["passive", "switching"]
@@ -23,11 +25,12 @@ class _Part(BaseModel):
 
 
 class Selection(_Part):
-    """Scenario files by a glob pattern relative to the recipe, each driven once per kind of
-    dampers.
+    """Scenario files by a glob pattern relative to the recipe, each driven once per surface (its
+    own if none is named) and kind of dampers.
     """
 
     scenarios: str = Field(min_length=1)
+    surfaces: tuple[SurfaceName, ...] = ()
     dampers: tuple[Dampers, ...] = Field(min_length=1)
 
 
@@ -41,16 +44,27 @@ class DatasetRecipe(_Part):
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One run: its scenario file, its dampers and its seed; `stem` names its file."""
+    """One run: its scenario file, dampers, seed and surface, which is the scenario's own if None;
+    `stem` names its file.
+    """
 
     scenario: Path
     dampers: Dampers
     seed: int
+    surface: SurfaceName | None = None
 
     @property
     def stem(self) -> str:
-        """File name without ending, `<scenario>_<dampers>`."""
-        return f"{self.scenario.stem}_{self.dampers}"
+        """File name without ending, `<scenario>[_<surface>]_<dampers>`."""
+        surface = self.surface or ""
+        road = f"class_{surface.lower()}" if len(surface) == 1 else surface
+        return "_".join(part for part in (self.scenario.stem, road, self.dampers) if part)
+
+    @property
+    def overrides(self) -> list[str]:
+        """What is laid over the scenario."""
+        surface = [] if self.surface is None else [f"road.surface={self.surface}"]
+        return [f"seed={self.seed}", *surface]
 
 
 def load_recipe(path: Path) -> DatasetRecipe:
@@ -73,15 +87,15 @@ def load_recipe(path: Path) -> DatasetRecipe:
 
 def plan(recipe: DatasetRecipe, folder: Path) -> list[PlannedRun]:
     """Return the runs in a fixed order; raises `InputError` for a pattern that matches nothing."""
-    chosen: list[tuple[Path, Dampers]] = []
+    chosen: list[tuple[Path, SurfaceName | None, Dampers]] = []
     for selection in recipe.runs:
         files = sorted(folder.glob(selection.scenarios))
         if not files:
             raise InputError(f"no scenario in {folder} matches '{selection.scenarios}'")
-        chosen += [(file, dampers) for file in files for dampers in selection.dampers]
+        chosen += itertools.product(files, selection.surfaces or (None,), selection.dampers)
     runs = [
-        PlannedRun(file, dampers, 1000 * recipe.seed + i)
-        for i, (file, dampers) in enumerate(chosen)
+        PlannedRun(file, dampers, 1000 * recipe.seed + i, surface)
+        for i, (file, surface, dampers) in enumerate(chosen)
     ]
     stems = [run.stem for run in runs]
     doubled = sorted({stem for stem in stems if stems.count(stem) > 1})
@@ -120,7 +134,7 @@ def _is_there(planned: PlannedRun, directory: Path) -> bool:
     return bool(json.loads(metadata.get(b"recipe", b"{}")) == _recipe(planned))
 
 
-def _recipe(planned: PlannedRun) -> dict[str, str | int]:
+def _recipe(planned: PlannedRun) -> dict[str, str | int | None]:
     """Return what a run is driven from, for its file's metadata."""
     from cosim.provenance import sha256
     from cosim.vehicle import builtin_fmu
@@ -131,6 +145,7 @@ def _recipe(planned: PlannedRun) -> dict[str, str | int]:
     }
     return {
         "scenario": planned.scenario.name,
+        "surface": planned.surface,
         "dampers": planned.dampers,
         "seed": planned.seed,
         **digests,
@@ -145,7 +160,7 @@ def drive(planned: PlannedRun, directory: Path) -> str:
     from cosim.scenario.load import load
     from sensor.dataset import Run, write_run
 
-    scenario = load(planned.scenario, [f"seed={planned.seed}"])
+    scenario = load(planned.scenario, planned.overrides)
     switching = planned.dampers == "switching"
     dampers = SwitchingDampers(planned.seed, STEP_S) if switching else None
     assembly = assemble(scenario, Passive(kind="passive"), NoSensor(), dampers)

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 from cosim.errors import did_you_mean
-from cosim.metrics import figure, metric_names, with_unit
+from cosim.metrics import MANOEUVRE_FIGURES, figure, metric_names, with_unit
 
 
 class Bounds(Protocol):
@@ -73,8 +73,20 @@ def check_metric(metric: str, labels: Sequence[str], manoeuvre: str | None = Non
     names = metric_names(labels, manoeuvre)
     if metric in names:
         return None
+    kinds = _kinds_of(metric, labels)
+    if kinds:
+        here = f"not of {manoeuvre}" if manoeuvre else "and this scenario has none"
+        return f"'{metric}' is a figure of the manoeuvre {kinds}, {here}"
     hint = did_you_mean(metric, names)
     return f"'{metric}' is not a metric{hint or ', such as network.overall.accuracy_percent'}"
+
+
+def _kinds_of(metric: str, labels: Sequence[str]) -> str:
+    """Return the kinds of manoeuvre that have this figure, in words; nothing for another metric."""
+    label, _, rest = metric.partition(".")
+    name = (rest if label in labels else metric).removeprefix("manoeuvre.")
+    kinds = [kind for kind, names in MANOEUVRE_FIGURES.items() if name in names]
+    return " or ".join(kinds) if name != metric else ""
 
 
 def on_surface(limits: Iterable[Bounds], surface: str | None) -> list[Bounds]:

@@ -24,6 +24,7 @@ ERROR_FIGURES: Final = (
     "sign_agreement_percent",
 )
 COMFORT_FIGURES: Final = ("weighted_acceleration_m_s2", "deflection_rms_m", "tyre_load_rms_n")
+GRIP_FIGURES: Final = ("peak_percent", "mean_percent")
 RUN_FIGURES: Final = (
     "lap_time_s",
     "largest_deviation_m",
@@ -108,6 +109,7 @@ def metric_names(labels: Sequence[str] = (), manoeuvre: str | None = None) -> li
         for figure in ERROR_FIGURES
     ]
     names += [f"comfort.{figure}" for figure in COMFORT_FIGURES]
+    names += [f"grip.{wheel}.{figure}" for wheel in WHEELS for figure in GRIP_FIGURES]
     names += [f"manoeuvre.{figure}" for figure in MANOEUVRE_FIGURES.get(manoeuvre or "", ())]
     return names + [f"{label}.{name}" for label in labels for name in names]
 

@@ -56,6 +56,10 @@ RIDE: Final = (
         for c in CORNERS
     ),
     *(_own(f"Car.Fz{c}", "N", f"vertical tyre force {c}", False) for c in CORNERS),
+    *(
+        _own(f"Car.GripShare{c}", "1", f"share of its grip that the tyre {c} uses", False)
+        for c in CORNERS
+    ),
 )
 
 STEER: Final = _own("DM.Steer.Ang", "rad", "steering-wheel angle, positive to the left")

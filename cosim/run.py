@@ -18,6 +18,7 @@ from cosim.errors import InputError, NetworkError
 from cosim.limits import Bounds, Verdict, evaluate, on_surface
 from cosim.recorder import Recorder, require_parquet
 from cosim.scenario.controllers import Passive, Skyhook
+from cosim.scenario.paper_row import row_of
 from cosim.scenario.schema import Scenario
 
 Progress = Callable[[str, int, int], None]
@@ -66,6 +67,10 @@ class RunResult(Protocol):
     @property
     def manoeuvre(self) -> Mapping[str, Any]:
         """Figures of `cosim.metrics.MANOEUVRE_FIGURES` by name; empty without a manoeuvre."""
+
+    @property
+    def grip(self) -> Mapping[str, Any]:
+        """Figures of `cosim.metrics.GRIP_FIGURES` by wheel; empty where the vehicle has none."""
 
 
 class Assembly(Protocol):
@@ -218,6 +223,7 @@ def _run(
         **compare(assembly.recorder),
         "comfort": dict(result.comfort),
         "manoeuvre": dict(result.manoeuvre),
+        "grip": dict(result.grip),
     }
     return RunOutcome(label, assembly.recorder, figures)
 
@@ -233,7 +239,7 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
             "scenario": scenario.name,
             "runs": figures,
             "limits": [asdict(verdict) for verdict in verdicts],
-            "paper": paper_figures(scenario.paper_row if _is_papers(scenario) else None),
+            "paper": paper_figures(row_of(scenario)),
         }
     )
     _write_json(output_dir / "metrics.json", metrics)
@@ -249,13 +255,6 @@ def _left_out(scenario: Scenario, counted: Sequence[Bounds]) -> tuple[str, ...]:
     others = {limit.surface for limit in scenario.limits if limit not in counted}
     names = ", ".join(sorted(str(name) for name in others))
     return (f"{what} for another surface ({names}) and left out on {scenario.road.surface_name}",)
-
-
-def _is_papers(scenario: Scenario) -> bool:
-    """Whether the scenario still is its row of the paper: the whole lap, by that row's driver."""
-    row = scenario.paper_row or ""
-    style = f"{scenario.driver.style.capitalize()} driver"
-    return bool(row) and scenario.duration == "lap" and ("driver" not in row or style in row)
 
 
 def _unfinished(scenario: Scenario, figures: Mapping[str, Any]) -> list[Verdict]:

@@ -56,7 +56,7 @@ def counter(total: int) -> Callable[[Ended], None]:
 
 def outcome(shown: Outcome) -> None:
     """Say on stderr what came out of one scenario."""
-    from cosim.tables import comparison_table, estimate_table, verdict_table
+    from cosim.tables import comparison_table, estimate_table, manoeuvre_table, verdict_table
 
     paper = shown.metrics["paper"]
     for one in shown.runs:
@@ -71,6 +71,9 @@ def outcome(shown: Outcome) -> None:
         table(estimate_table(shown.runs[0].figures, paper))
     else:
         table(comparison_table({one.label: one.figures for one in shown.runs}))
+    driven = manoeuvre_table({one.label: one.figures for one in shown.runs})
+    if driven is not None:
+        table(driven)
     if shown.verdicts:
         table(verdict_table(shown.verdicts))
     for note in shown.notes:

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from cosim.limits import Verdict
-from cosim.metrics import COMFORT_FIGURES, ESTIMATORS, PARTS, figure, unit_of
+from cosim.metrics import (
+    COMFORT_FIGURES,
+    ESTIMATORS,
+    PARTS,
+    WHEELS,
+    figure,
+    unit_of,
+    with_unit,
+)
 from sensor.metrics import LEAST_TRUTH_RMS
 
 NAMES: Final = {
@@ -20,6 +28,35 @@ COMFORT_NAMES: Final = {
     "weighted_acceleration_m_s2": "ISO 2631-1 weighted acceleration",
     "deflection_rms_m": "Suspension deflection rms",
     "tyre_load_rms_n": "Dynamic tyre load rms",
+}
+MANOEUVRE_NAMES: Final = {
+    "clearance_m": "Smallest clearance to the cones",
+    "entry_speed_kmh": "Speed at the entry",
+    "exit_speed_kmh": "Speed at the exit",
+    "start_speed_kmh": "Speed at the beginning",
+    "speed_mean_kmh": "Mean speed",
+    "speed_deviation_kmh": "Largest deviation from the speed",
+    "path_deviation_m": "Largest deviation from the path",
+    "lateral_acceleration_m_s2": "Steady lateral acceleration",
+    "lateral_acceleration_max_m_s2": "Largest lateral acceleration",
+    "lateral_acceleration_response_time_s": "Response time of the lateral acceleration",
+    "lateral_displacement_m": "Lateral displacement 1.07 s after beginning of steer",
+    "side_slip_deg": "Side slip angle",
+    "steering_wheel_deg": "Steering-wheel angle",
+    "yaw_rate_deg_s": "Steady yaw rate",
+    "yaw_rate_max_deg_s": "Largest yaw rate",
+    "yaw_rate_peak_deg_s": "Peak yaw rate after the reversal",
+    "yaw_rate_after_1_00_s_percent": "Yaw rate 1.00 s after completion of steer, of the peak",
+    "yaw_rate_after_1_75_s_percent": "Yaw rate 1.75 s after completion of steer, of the peak",
+    "yaw_gain_per_s": "Yaw rate per steering-wheel angle",
+    "yaw_response_time_s": "Response time of the yaw rate",
+    "yaw_peak_time_s": "Peak response time of the yaw rate",
+    "yaw_overshoot_percent": "Overshoot of the yaw rate",
+    "yaw_change_deg": "Largest change of the yaw angle",
+    "time_s": "Time",
+    "distance_m": "Distance",
+    "mean_deceleration_m_s2": "Mean fully developed deceleration",
+    "mean_acceleration_m_s2": "Mean acceleration",
 }
 
 
@@ -89,6 +126,30 @@ def comparison_table(runs: Mapping[str, Mapping[str, Any]]) -> Table:
         accuracy = figure(figures, "network.overall.accuracy_percent")
         rows.append((label, *comfort, number(rmse), number(accuracy, 1)))
     return Table("Controllers compared", columns, tuple(rows))
+
+
+def manoeuvre_table(runs: Mapping[str, Mapping[str, Any]]) -> Table | None:
+    """Return the figures of the manoeuvre and the tyres' peak shares of grip, a column per run;
+    None without a manoeuvre.
+    """
+    names = dict.fromkeys(name for run in runs.values() for name in run.get("manoeuvre", {}))
+    if not names:
+        return None
+    rows = []
+    for name in names:
+        values = [figure(run, f"manoeuvre.{name}") for run in runs.values()]
+        cells = ("-" if value is None else with_unit(value, name) for value in values)
+        rows.append((MANOEUVRE_NAMES[name], *cells))
+    grip = [_grip(run) for run in runs.values()]
+    if any(grip):
+        rows.append((f"Peak share of grip, {' '.join(WHEELS)}", *(cell or "-" for cell in grip)))
+    return Table("Manoeuvre", ("figure", *runs), tuple(rows))
+
+
+def _grip(run: Mapping[str, Any]) -> str:
+    """Return the peak share of grip of each wheel in %, or nothing."""
+    peaks = [figure(run, f"grip.{wheel}.peak_percent") for wheel in WHEELS]
+    return "" if None in peaks else " ".join(number(peak, 0) for peak in peaks) + " %"
 
 
 def verdict_table(verdicts: Sequence[Verdict]) -> Table:

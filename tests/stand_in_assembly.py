@@ -40,6 +40,7 @@ class Result:
         }
     )
     manoeuvre: Mapping[str, Any] = field(default_factory=dict)
+    grip: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass

@@ -72,6 +72,18 @@ def test_runs_are_in_the_order_of_the_recipe_then_of_the_names(tmp_path: Path) -
     assert all(run.scenario.is_file() for run in runs)
 
 
+def test_each_surface_is_a_run_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").touch()
+    one = Selection(scenarios="a.yaml", surfaces=("A", "smooth"), dampers=("passive", "switching"))
+    runs = plan(DatasetRecipe(name="surfaces", seed=0, runs=(one,)), tmp_path)
+    assert [(run.stem, run.overrides) for run in runs] == [
+        ("a_class_a_passive", ["seed=0", "road.surface=A"]),
+        ("a_class_a_switching", ["seed=1", "road.surface=A"]),
+        ("a_smooth_passive", ["seed=2", "road.surface=smooth"]),
+        ("a_smooth_switching", ["seed=3", "road.surface=smooth"]),
+    ]
+
+
 def test_a_pattern_without_a_file(tmp_path: Path) -> None:
     (tmp_path / "b_1.yaml").touch()
     (tmp_path / "recipe.yaml").write_text(RECIPE)
@@ -97,6 +109,7 @@ def test_a_run_that_is_meant_twice(tmp_path: Path) -> None:
         ("seed: 3", "seed: 1.5", ("seed", "integer")),
         ("[passive]", "[passive, active]", ("runs.1.dampers.1", "'passive' or 'switching'")),
         ("[passive]", "[]", ("runs.1.dampers",)),
+        ("    dampers: [passive]", "    surfaces: [E]\n    dampers: [passive]", ("surfaces.0",)),
         ("b_*.yaml", "''", ("runs.0.scenarios",)),
         ("name: a few\n", "", ("name",)),
         ("seed: 3", "seed: 3\nseed: 4", ("seed",)),
@@ -143,7 +156,9 @@ def test_the_recipe_of_the_published_network() -> None:
     assert len({run.stem for run in runs}) == len({run.seed for run in runs}) == len(runs)
     assert {run.scenario.stem.split("_")[0] for run in runs} == {"heilbronn", "rural", "hockenheim"}
     assert all(run.dampers == "passive" for run in runs if "hockenheim" in run.stem)
-    assert all(load(run.scenario).duration == "lap" for run in runs)
+    assert all(load(run.scenario, run.overrides).duration == "lap" for run in runs)
+    assert len(runs) == 30
+    assert {run.surface for run in runs} == {"A", "smooth"}
 
 
 # ---------------------------------------------------------------- driving

@@ -11,7 +11,9 @@ from cosim.errors import InputError
 from cosim.run import resolved_yaml
 from cosim.scenario.load import load
 from cosim.scenario.overrides import split_key
+from cosim.scenario.paper_row import row_of
 from cosim.scenario.schema import json_schema
+from sensor.paper import paper_rows
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 FILES = sorted(path for path in SCENARIOS.rglob("*.yaml") if path.parent.name != "datasets")
@@ -311,8 +313,39 @@ def test_the_committed_json_schema_is_current():
     assert json.loads((SCENARIOS / "schema.json").read_text()) == json_schema()
 
 
-def test_scenarios_exist():
-    assert len(list((SCENARIOS / "laps").glob("*.yaml"))) == 18
+def test_every_row_of_the_paper_has_its_scenario():
+    scenarios = [load(path) for path in sorted((SCENARIOS / "paper").glob("*.yaml"))]
+    assert sorted(row_of(scenario) for scenario in scenarios) == sorted(
+        row.scenario for row in paper_rows()
+    )
+    for scenario in scenarios:
+        assert scenario.road.surface_name == "smooth"
+        regression = [x for x in scenario.limits if x.metric == "network.overall.rmse_m_s"]
+        assert [limit.surface for limit in regression] == ["smooth", "A", "B"]
+        assert len(scenario.limits) >= 5
+
+
+@pytest.mark.parametrize(
+    ("stem", "override", "still"),
+    [
+        ("hockenheim_normal", "road.surface=B", True),
+        ("hockenheim_normal", "driver.style=defensive", False),
+        ("hockenheim_normal", "driver.speed_kmh=80", False),
+        ("hockenheim_normal", "road.track=rural", False),
+        ("hockenheim_normal", "duration=10", False),
+        ("constant_turn_r100_100_kmh", "road.direction=right", True),
+        ("constant_turn_r100_100_kmh", "driver.speed_kmh=90", False),
+        ("constant_turn_r100_100_kmh", "road.radius_m=120", False),
+        ("sine_with_dwell_060_deg_080_kmh", "manoeuvre.amplitude_deg=80", False),
+        ("slalom_18m_015_kmh", "manoeuvre.spacing_m=20", False),
+        ("double_lane_change_030_kmh", "driver.speed_kmh=40", False),
+        ("bumpy_road_025_kmh", "driver.speed_kmh=25", True),
+        ("bumpy_road_025_kmh", "driver.speed_kmh=26", False),
+    ],
+)
+def test_a_changed_scenario_is_no_longer_the_papers_row(stem, override, still):
+    scenario = load(SCENARIOS / "paper" / f"{stem}.yaml", [override])
+    assert (row_of(scenario) is not None) == still
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

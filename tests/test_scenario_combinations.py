@@ -74,5 +74,10 @@ def test_a_limit_may_name_only_the_figures_of_its_manoeuvre(tmp_path: Path) -> N
     path.write_text(text + "limits: [{metric: manoeuvre.clearance_m, min: 0.1}]\n")
     assert load(path).limits[0].metric == "manoeuvre.clearance_m"
     path.write_text(text + "limits: [{metric: manoeuvre.side_slip_deg, max: 1}]\n")
-    with pytest.raises(InputError, match=r"'manoeuvre\.side_slip_deg' is not a metric"):
+    other = r"is a figure of the manoeuvre constant_radius, not of slalom"
+    with pytest.raises(InputError, match=other):
         load(path)
+    with pytest.raises(InputError, match="and this scenario has none"):
+        load(path, ["manoeuvre=", "road.length_m=100"])
+    with pytest.raises(InputError, match=r"did you mean 'manoeuvre.clearance_m'"):
+        load(path, ["limits.0.metric=manoeuvre.clearence_m"])

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from cosim.errors import CosimError
 from cosim.metrics import WHEELS
 from cosim.recorder import Recorder
-from cosim.tables import Table, comparison_table, estimate_table
+from cosim.tables import Table, comparison_table, estimate_table, manoeuvre_table
 
 if TYPE_CHECKING:
     from cosim.run import Outcome, RunOutcome
@@ -39,6 +39,7 @@ def write_report(outcome: Outcome, versions: Mapping[str, Any], path: Path) -> N
         outcome=outcome,
         scenario=outcome.scenario,
         versions=versions,
+        manoeuvre=manoeuvre_table({run.label: run.figures for run in outcome.runs}),
         comparison=_comparison(outcome),
         tables={run.label: _table(outcome, run) for run in outcome.runs},
         facts={run.label: facts(run) for run in outcome.runs},
@@ -65,10 +66,11 @@ def facts(run: RunOutcome) -> list[tuple[str, str]]:
     """Return the run in a few figures: how it ended, how long it took, how much of it counts."""
     figures = run.figures
     lap = figures["lap_time_s"]
+    time = "Time of the manoeuvre" if figures["manoeuvre"] else "Lap time"
     valid, rows = figures["valid_samples"], run.recorder.rows
     return [
         ("Finished", figures["finish_reason"]),
-        ("Lap time", "-" if lap is None else f"{lap:.2f} s"),
+        (time, "-" if lap is None else f"{lap:.2f} s"),
         ("Simulated", f"{figures['simulated_s']:.2f} s"),
         ("Speed of the run", f"{figures['real_time_factor']:.1f} times real time"),
         ("Valid samples", f"{valid} of {rows}"),

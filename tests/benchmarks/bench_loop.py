@@ -31,7 +31,7 @@ from cosim.speed_profile import STYLES, speed_profile
 from cosim.start import builtin_start
 from cosim.vehicle import State, builtin_fmu
 
-SCENARIO = Path(__file__).parents[2] / "scenarios/laps/hockenheim_normal_class_a.yaml"
+SCENARIO = Path(__file__).parents[2] / "scenarios/paper/hockenheim_normal.yaml"
 DURATION = 60
 STEPS = round(DURATION / STEP_S)
 ROUNDS = 7
@@ -40,7 +40,7 @@ INPUTS = [q.variable for q in INPUT_QUANTITIES]
 
 def prepared(**blocks: Any) -> Assembly:
     """Return a run of the first minute of the lap."""
-    scenario = load(SCENARIO, [f"duration={DURATION}"])
+    scenario = load(SCENARIO, [f"duration={DURATION}", "road.surface=A"])
     return assemble(scenario, scenario.controllers[0], **blocks)
 
 
@@ -78,7 +78,7 @@ def run_replayed() -> float:
 @cache
 def lap() -> tuple[dict[str, Any], npt.NDArray[np.float64]]:
     """Return the run's start values and its inputs (steps, 7): everybody drives the same minute."""
-    scenario = load(SCENARIO, [f"duration={DURATION}"])
+    scenario = load(SCENARIO, [f"duration={DURATION}", "road.surface=A"])
     assembly = prepared(sensor=NoSensor())
     assembly.run(None)
     course = course_of(scenario)
