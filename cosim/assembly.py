@@ -20,7 +20,7 @@ from cosim.errors import InputError, NetworkError, Problem
 from cosim.fmi import Description, Value
 from cosim.grip import grip_figures
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
-from cosim.manoeuvre import Plan, manoeuvre_of, motion_of
+from cosim.manoeuvre import Plan, friction_of, manoeuvre_of, motion_of
 from cosim.manoeuvre.programme import ProgrammedDriver
 from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, TRUTH, Quantity
 from cosim.recorder import Recorder, Signal
@@ -124,7 +124,7 @@ def assemble(
     start = _start_values(scenario, description, course, plan, passive)
     initial = 0.0 if isinstance(controller, Passive) else controller.initial_command
     steps, if_late = _steps(scenario, plan)
-    driver = plan.driver(STEP_S)
+    driver = plan.driver(STEP_S, friction_of(scenario))
     recorder = Recorder(record_groups(), steps + 1, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, initial)
     files = {"fmu": description.path, "network": network, "road": course.file}

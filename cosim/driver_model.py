@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,10 @@ class DriverModel:
     speed_gain: float = 1.0  # 1/s
     speed_integral: float = 0.15  # 1/s^2
     creep_speed: float = 0.7  # up to a stop line [m/s]
+
+    def on(self, friction: float) -> DriverModel:
+        """Return the same car on a road of another friction, 1 being dry asphalt."""
+        return replace(self, saturation=friction * self.saturation)
 
     def slip_growth(self, lateral_acceleration: float) -> float:
         """Return how much larger the slip angles are than on tyres without an end to their grip."""

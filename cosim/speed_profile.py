@@ -32,6 +32,15 @@ STYLES: Final = {
     "normal": Style(3.0, 4.0, 4.0),
     "defensive": Style(2.0, 2.0, 3.0),
 }
+GRIP_USED: Final = 0.65  # of the road's grip at most, so that friction 1 leaves the styles alone
+ALONG: Final = 9.8  # what the tyres hold on dry asphalt [m/s2]
+ACROSS: Final = 8.2
+
+
+def careful(style: Style, friction: float) -> Style:
+    """Return the style on a road whose `friction` (1 on dry asphalt) the driver knows."""
+    along, across = GRIP_USED * ALONG * friction, GRIP_USED * ACROSS * friction
+    return Style(min(style.accelerate, along), min(style.brake, along), min(style.corner, across))
 
 
 def speed_profile(track: Track, style: Style, cap: float | None = None) -> Array:

@@ -15,7 +15,7 @@ from cosim.manoeuvre.slalom import Cones
 from cosim.manoeuvre.straight import SpeedChange
 from cosim.scenario import manoeuvre as settings
 from cosim.scenario.schema import Scenario
-from cosim.speed_profile import STYLES
+from cosim.speed_profile import STYLES, careful
 
 
 def manoeuvre_of(scenario: Scenario, step_s: float) -> Manoeuvre:
@@ -25,7 +25,8 @@ def manoeuvre_of(scenario: Scenario, step_s: float) -> Manoeuvre:
     """
     wanted, kmh = scenario.manoeuvre, scenario.driver.speed_kmh
     if wanted is None:
-        return FollowRoad(STYLES[scenario.driver.style], None if kmh is None else kmh / 3.6)
+        style = careful(STYLES[scenario.driver.style], friction_of(scenario))
+        return FollowRoad(style, None if kmh is None else kmh / 3.6)
     if kmh is None:
         raise ValueError("a manoeuvre needs driver.speed_kmh")  # refused when the file was read
     speed = kmh / 3.6
@@ -35,7 +36,7 @@ def manoeuvre_of(scenario: Scenario, step_s: float) -> Manoeuvre:
         return ConstantRadius(speed)
     start = RUN_UP_S * speed if wanted.start_m is None else wanted.start_m
     if isinstance(wanted, settings.DoubleLaneChange):
-        return DoubleLaneChange(speed, start, body_of(scenario))
+        return DoubleLaneChange(speed, start, body_of(scenario), scenario.road.friction)
     if isinstance(wanted, settings.Slalom):
         cones = Cones(max(start, wanted.spacing_m), wanted.spacing_m, wanted.cones)
         return Slalom(speed, cones, wanted.clearance_m, body_of(scenario))
@@ -52,6 +53,11 @@ def manoeuvre_of(scenario: Scenario, step_s: float) -> Manoeuvre:
     return StepSteer(speed, start, angle, wanted.rise_s, step_s)
 
 
+def friction_of(scenario: Scenario) -> float:
+    """Return the road's friction, 1 on dry asphalt."""
+    return 1.0 if scenario.road.friction is None else scenario.road.friction
+
+
 def body_of(scenario: Scenario) -> Body:
     """Return the outline of the scenario's vehicle."""
     outline = scenario.vehicle.outline
@@ -59,4 +65,4 @@ def body_of(scenario: Scenario) -> Body:
     return Body(outline.front_m, outline.rear_m, left, outline.width_m - left)
 
 
-__all__ = ["Body", "Manoeuvre", "Motion", "Plan", "manoeuvre_of", "motion_of"]
+__all__ = ["Body", "Manoeuvre", "Motion", "Plan", "friction_of", "manoeuvre_of", "motion_of"]

@@ -27,6 +27,7 @@ class DoubleLaneChange:
     speed: float
     start: float
     body: Body
+    friction: float | None = None
 
     @property
     def road_length(self) -> float:
@@ -44,7 +45,9 @@ class DoubleLaneChange:
         side_slip = DriverModel().steady_side_slip(self.speed, 1e-6) / 1e-6
         path = lane_change.gentlest_path(sections, self.body, side_slip)
         lateral = float(np.abs(path.derivative(2)(path.x)).max()) * self.speed**2
-        sentence = too_fast("the double lane change", round(self.speed * KMH, 3), lateral)
+        sentence = too_fast(
+            "the double lane change", round(self.speed * KMH, 3), lateral, self.friction
+        )
         if sentence is not None:
             raise ValueError(sentence)
         line = beside(track, lane_change.moved(path, self.start, y), self.start + self._length)

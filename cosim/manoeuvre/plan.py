@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.driver import PathDriver
+from cosim.driver_model import DriverModel
 from cosim.manoeuvre.motion import Motion
 from cosim.manoeuvre.programme import Programme, ProgrammedDriver
 from cosim.road.track import Track
@@ -36,9 +37,9 @@ class Plan:
     programme: Programme | None = None
     end: str = "end of the manoeuvre"
 
-    def driver(self, step_s: float) -> PathDriver | ProgrammedDriver:
-        """Return the driver block."""
-        driver = PathDriver(self.line, self.speed, step_s)
+    def driver(self, step_s: float, friction: float = 1.0) -> PathDriver | ProgrammedDriver:
+        """Return the driver block, who knows the road's friction."""
+        driver = PathDriver(self.line, self.speed, step_s, DriverModel().on(friction))
         return driver if self.programme is None else ProgrammedDriver(driver, self.programme)
 
 

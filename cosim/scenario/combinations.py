@@ -56,21 +56,24 @@ def combination_problems(scenario: Scenario) -> Iterator[Problem]:
         yield from _speed_problems(scenario, manoeuvre, scenario.driver.speed_kmh)
 
 
-def too_fast(name: str, kmh: float, lateral: float) -> str | None:
+def too_fast(name: str, kmh: float, lateral: float, friction: float | None) -> str | None:
     """Return a sentence where a manoeuvre's path takes more lateral acceleration [m/s2] than tyres
-    hold, else None.
+    hold on a road of this friction, else None.
     """
-    if lateral <= MOST_LATERAL:
+    most = MOST_LATERAL * (1.0 if friction is None else friction)
+    if lateral <= most:
         return None
+    where = "" if friction is None else f" at a friction of {friction:g}"
     return (
         f"{name} at {kmh:g} km/h takes {lateral:.1f} m/s2 of lateral acceleration; the tyres of a "
-        f"road car hold less than {MOST_LATERAL:g} m/s2"
+        f"road car hold less than {most:g} m/s2{where}"
     )
 
 
 def _speed_problems(scenario: Scenario, manoeuvre: Manoeuvre, kmh: float) -> Iterator[Problem]:
     key = ("driver", "speed_kmh")
-    sentence = too_fast(_NAMES[type(manoeuvre)], kmh, _lateral(scenario, manoeuvre, kmh / 3.6))
+    lateral = _lateral(scenario, manoeuvre, kmh / 3.6)
+    sentence = too_fast(_NAMES[type(manoeuvre)], kmh, lateral, scenario.road.friction)
     if sentence is not None:
         yield scenario.problem(key, sentence)
     if isinstance(manoeuvre, SineWithDwell | StepSteer) and kmh < LEAST_STEER_KMH:
