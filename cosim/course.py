@@ -63,7 +63,9 @@ def _track(road: Road, length: float | None) -> Track:
     if road.track == "circle":
         angle = 270.0 if road.angle_deg is None else road.angle_deg
         return load_circle(float(road.radius_m or 0.0), angle, road.direction or "left")
-    return load_track(str(road.track), length if road.length_m is None else road.length_m)
+    if road.track == "straight" and road.length_m is None:
+        return load_track("straight", length)
+    return load_track(str(road.track), road.length_m)
 
 
 def _surface(scenario: Scenario) -> Surface:

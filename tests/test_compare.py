@@ -7,11 +7,25 @@ from stand_in_assembly import GROUPS, WINDOW, StandIn
 
 from cosim.compare import compare, paper_figures
 from cosim.limits import check_metric, evaluate, on_surface
-from cosim.metrics import COMFORT_FIGURES, ERROR_FIGURES, ESTIMATORS, figure, metric_names, unit_of
+from cosim.metrics import (
+    COMFORT_FIGURES,
+    ERROR_FIGURES,
+    ESTIMATORS,
+    MANOEUVRE_FIGURES,
+    figure,
+    metric_names,
+    unit_of,
+)
 from cosim.recorder import Recorder
 from cosim.run import finite
 from cosim.scenario.limit import Limit
-from cosim.tables import comparison_table, estimate_table, plain
+from cosim.tables import (
+    MANOEUVRE_NAMES,
+    comparison_table,
+    estimate_table,
+    manoeuvre_table,
+    plain,
+)
 
 
 @pytest.fixture(scope="module")
@@ -132,6 +146,29 @@ def test_controllers_are_compared_with_the_first(figures):
     rows = comparison_table(runs).rows
     assert rows[0][:4] == ("passive", "2", "2", "2")
     assert rows[1][:2] == ("skyhook_truth", "1.5 (-25.0 %)")
+
+
+def test_every_figure_of_a_manoeuvre_has_words_and_a_unit():
+    names = {name for figures in MANOEUVRE_FIGURES.values() for name in figures}
+    assert set(MANOEUVRE_NAMES) == names
+    assert all(unit_of(name) for name in names)
+    assert unit_of("yaw_rate_deg_s") == "°/s"
+    assert unit_of("yaw_gain_per_s") == "1/s"
+    assert unit_of("speed_mean_kmh") == "km/h"
+
+
+def test_the_manoeuvre_is_a_column_per_run():
+    driven = {"manoeuvre": {"clearance_m": 0.05, "side_slip_deg": -3.6539}}
+    grip = {"grip": {wheel: {"peak_percent": 80.4} for wheel in ("FL", "FR", "RL", "RR")}}
+    table = manoeuvre_table({"soft": driven | grip, "hard": {"manoeuvre": {"clearance_m": -0.1}}})
+    assert table is not None
+    assert table.columns == ("figure", "soft", "hard")
+    assert table.rows == (
+        ("Smallest clearance to the cones", "0.05 m", "-0.1 m"),
+        ("Side slip angle", "-3.654 °", "-"),
+        ("Peak share of grip, FL FR RL RR", "80 80 80 80 %", "-"),
+    )
+    assert manoeuvre_table({"soft": {"manoeuvre": {}}}) is None
 
 
 def test_json_never_holds_nan():

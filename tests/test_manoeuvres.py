@@ -158,6 +158,36 @@ def test_accelerating_holds_the_acceleration(driven: Any) -> None:
     assert found["time_s"] == pytest.approx((60 - 20) / 3.6 / 2, rel=0.05)
 
 
+def test_braking_follows_a_road_that_bends(tmp_path: Path) -> None:
+    manoeuvre = "kind: brake, deceleration_m_s2: 3, start_m: 175"  # in the rural road's first bend
+    result, _ = drive(scenario(tmp_path, 40, manoeuvre, "{track: rural}"))
+    assert result.finish_reason == "end of the manoeuvre"
+    assert result.manoeuvre["path_deviation_m"] < 0.1
+    assert result.manoeuvre["yaw_change_deg"] > 2.0
+
+
+def test_the_driver_knows_a_slippery_road(tmp_path: Path) -> None:
+    path = tmp_path / "scenario.yaml"
+    path.write_text("name: snow\nroad: {track: rural, friction: 0.4}\ndriver: {style: normal}\n")
+    result, recorder = drive(path, "duration=40")
+    assert result.largest_deviation_m < 0.2
+    ay = recorder.group("channels")[:, 1]
+    assert np.abs(ay).max() < 0.4 * 8.2
+    path = scenario(tmp_path, 35, "kind: slalom, spacing_m: 18")
+    with pytest.raises(InputError, match=r"less than 4 m/s2 at a friction of 0\.4"):
+        drive(path, "road.friction=0.4")
+
+
+def test_grip_is_all_but_used_up_at_the_limit(driven: Any) -> None:
+    """0.74 of the 0.84 g that the car can hold at all; a drive straight on hardly uses any."""
+    fast, _ = driven(75, "kind: constant_radius", R60)
+    slow, _ = driven(40, "kind: constant_speed", "{track: straight, length_m: 80}")
+    peaks = [wheel["peak_percent"] for wheel in fast.grip.values()]
+    assert len(peaks) == 4
+    assert 70 < min(peaks) < max(peaks) < 115
+    assert max(wheel["peak_percent"] for wheel in slow.grip.values()) < 15
+
+
 def test_it_begins_where_it_is_told_to(tmp_path: Path) -> None:
     path = scenario(tmp_path, 50, "kind: brake, deceleration_m_s2: 5, start_m: 60")
     _, recorder = drive(path)

@@ -87,3 +87,23 @@ def test_without_uplot_the_run_goes_on(tmp_path, monkeypatch, outcome):
         "no report.html was written: it needs uplot-python; pip install 'suspension-cosim[report]'",
     )
     assert (tmp_path / "out" / "metrics.json").exists()
+
+
+def test_a_manoeuvre_shows_its_figures_below_the_limits(tmp_path):
+    (tmp_path / "a.yaml").write_text(
+        "name: circle\nroad: {track: circle, radius_m: 60, angle_deg: 60}\n"
+        "manoeuvre: {kind: constant_radius}\ndriver: {speed_kmh: 40}\n"
+        "limits: [{metric: manoeuvre.path_deviation_m, max: 0.2}]\n"
+    )
+    done = execute(load(tmp_path / "a.yaml"), tmp_path / "out")
+    body = (done.output_dir / "report.html").read_text()
+    order = [
+        "Passed: 1 of 1 limits",
+        "manoeuvre.path_deviation_m",
+        "Steady lateral acceleration",
+        "Peak share of grip, FL FR RL RR",
+        "Time of the manoeuvre",
+    ]
+    positions = [body.index(text) for text in order]
+    assert positions == sorted(positions)
+    assert done.metrics["runs"]["passive"]["manoeuvre"]["side_slip_deg"] > 0.0
