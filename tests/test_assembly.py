@@ -88,13 +88,18 @@ def test_parameters_at_the_ends_of_their_range_reach_the_fmu(tmp_path: Path) -> 
 
 
 def test_the_friction_of_the_road_reaches_the_tyres_and_lasts(tmp_path: Path) -> None:
-    """On ice the car leaves the rural road's first lane change, on dry asphalt it does not."""
-    astray = {}
+    """With the same pedal the car brakes as hard as the friction lets it, to the end."""
+    rates = {}
     for friction in (0.1, 1.0):
-        road = f"{{track: rural, friction: {friction}}}"
-        car = driven(tmp_path, "14", road=road, driver="{style: normal}")
-        astray[friction] = car.driver.largest_deviation
-    assert astray[0.1] > 1.2 > 0.6 > astray[1.0]
+        sections = {
+            "road": f"{{track: straight, friction: {friction}}}",
+            "driver": "{speed_kmh: 30}",
+            "manoeuvre": "{kind: brake, pedal: 0.9}",
+        }
+        rates[friction] = assembled(tmp_path, "lap", sections).run(None).manoeuvre
+    assert 0.3 < rates[0.1]["mean_deceleration_m_s2"] < 0.1 * 11.0
+    assert 7.0 < rates[1.0]["mean_deceleration_m_s2"] < 11.0
+    assert rates[0.1]["distance_m"] > 7 * rates[1.0]["distance_m"]
 
 
 def test_another_fmu_without_an_input_for_friction(tmp_path: Path) -> None:

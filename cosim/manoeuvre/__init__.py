@@ -43,10 +43,11 @@ def manoeuvre_of(scenario: Scenario, step_s: float) -> Manoeuvre:
     if isinstance(wanted, settings.Brake):
         rate = None if wanted.deceleration_m_s2 is None else -wanted.deceleration_m_s2
         pedal = None if wanted.pedal is None else -wanted.pedal
-        return SpeedChange(speed, wanted.to_kmh / 3.6, start, step_s, rate, pedal)
+        friction = friction_of(scenario)
+        return SpeedChange(speed, wanted.to_kmh / 3.6, start, step_s, rate, pedal, friction)
     if isinstance(wanted, settings.Accelerate):
-        rate, pedal = wanted.acceleration_m_s2, wanted.pedal
-        return SpeedChange(speed, wanted.to_kmh / 3.6, start, step_s, rate, pedal)
+        rate, pedal, friction = wanted.acceleration_m_s2, wanted.pedal, friction_of(scenario)
+        return SpeedChange(speed, wanted.to_kmh / 3.6, start, step_s, rate, pedal, friction)
     angle = math.radians(wanted.amplitude_deg) * (1.0 if wanted.direction == "left" else -1.0)
     if isinstance(wanted, settings.SineWithDwell):
         return SineWithDwell(speed, start, angle, wanted.frequency_hz, wanted.dwell_s, step_s)

@@ -15,7 +15,7 @@ from cosim.manoeuvre.plan import KMH, SPARE_ROAD, Figures, Plan, constant
 from cosim.manoeuvre.programme import REST_S, Pedals
 from cosim.road.track import Track
 
-LEAST_GRIP: Final = 9.0  # m/s2; a pedal that asks for more gets no more
+SURE_GRIP: Final = 7.0  # m/s2 on dry asphalt; who asks for more may not get it
 REST: Final = 0.05  # m/s
 
 
@@ -32,19 +32,20 @@ class SpeedChange:
     step_s: float
     acceleration: float | None = None
     pedal: float | None = None
+    friction: float = 1.0
 
     @property
     def _expected(self) -> tuple[float, float]:
-        """Time [s] and way [m] that the change takes at least, by the driver's model."""
+        """Time [s] and way [m] that the change takes, by the driver's model."""
         m = DriverModel()
         if self.acceleration is not None:
-            rates = [abs(self.acceleration)] * 2
+            wanted = abs(self.acceleration)
         elif (pedal := float(self.pedal or 0.0)) < 0.0:
-            rates = [min(-pedal * m.brake_force / m.mass, LEAST_GRIP)] * 2
+            wanted = -pedal * m.brake_force / m.mass
         else:
-            full = (min(m.drive_force, m.drive_power / max(v, 1.0)) for v in (self.speed, self.end))
-            rates = [max(pedal * force / m.mass, 0.05) for force in full]
-        time = abs(self.end - self.speed) / min(rates)
+            wanted = pedal * min(m.drive_force, m.drive_power / self.end) / m.mass
+        rate = max(min(wanted, self.friction * SURE_GRIP), 0.05)
+        time = abs(self.end - self.speed) / rate
         return time, 0.5 * (self.speed + self.end) * time
 
     @property
