@@ -42,8 +42,8 @@ cross: $(VENV)/demo.stamp ## FMUs with binaries for Linux, Windows and macOS in 
 	$(BIN)/python -m pip install --quiet -e '.[cross]'
 	$(BIN)/python fmu/cross.py
 
-sanitize: $(VENV)/test.stamp ## AddressSanitizer, UBSan and leak check over 50 lives of the vehicle FMU
-	$(BIN)/python fmu/build.py --sanitize
+sanitize: $(VENV)/test.stamp ## lives and a million random calls of the vehicle FMUs under AddressSanitizer and UBSan
+	FUZZ_CALLS=500000 $(BIN)/python -m pytest -q -s tests/test_fmu_sanitizers.py
 
 validation: $(VENV)/test.stamp ## all gates of the vehicle, the slow ones too: docs/validation
 	$(BIN)/python -m pip install --quiet -e '.[docs]'

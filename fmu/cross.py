@@ -15,9 +15,11 @@ import zipfile
 from pathlib import Path
 
 import build
+from package import FMU_DIRECTORY, instantiation_token, write_zip
+from toolchain import FLAGS, VERSIONS, BuildError
 from variables import TableError
 
-CACHE = build.FMU_DIRECTORY.parent / "build" / "cross"
+CACHE = FMU_DIRECTORY.parent / "build" / "cross"
 TARGETS = {  # FMI 3 platform: Zig's target
     "x86_64-linux": "x86_64-linux-gnu.2.17",
     "aarch64-linux": "aarch64-linux-gnu.2.17",
@@ -36,7 +38,7 @@ MOVING = ["Init.Velocity=20", "DM.Gas=0.3", "DM.Steer.Ang=0.5"]  # what the smok
 def zig(target: str) -> str:
     """The C compiler for a target."""
     if importlib.util.find_spec("ziglang") is None:
-        raise build.BuildError(
+        raise BuildError(
             "Cross compilation needs Zig: pip install 'suspension-cosim[cross]' (or: ziglang)."
         )
     return f"{sys.executable} -m ziglang cc -target {target}"
@@ -44,9 +46,9 @@ def zig(target: str) -> str:
 
 def compiled(model: Path, platform: str) -> list[Path]:
     """FMUs of one platform, from the cache if its sources are the same."""
-    folder = CACHE / build.instantiation_token(model).strip("{}") / platform
+    folder = CACHE / instantiation_token(model).strip("{}") / platform
     known = sorted(folder.glob("*.fmu"))
-    if len(known) == len(build.VERSIONS):
+    if len(known) == len(VERSIONS):
         return known
     print(f"{platform}: compiling", flush=True)
     with tempfile.TemporaryDirectory() as name:
@@ -65,20 +67,21 @@ def merge(own: Path, others: list[Path], out: Path) -> Path:
                 if name.startswith("binaries/"):
                     files.setdefault(name, archive.read(name))
     out.mkdir(parents=True, exist_ok=True)
-    build.write_zip(out / own.name, files)
+    write_zip(out / own.name, files)
     return out / own.name
 
 
 def smoke(model: Path, compiler: str | None, emulator: list[str]) -> str:
     """What the smoke test says, FMI 2 and 3, on the machine that ``emulator`` runs."""
-    flags = [*build.FLAGS, "-static"] if emulator else build.FLAGS
+    flags = [*FLAGS, "-static"] if emulator else FLAGS
     with tempfile.TemporaryDirectory() as name:
         said = []
-        for program in build.smoke_programs(model, Path(name), compiler, flags):
+        programs = build.trial_programs(model, Path(name), compiler, flags, ("smoke",))
+        for program in programs.values():
             command = [*emulator, str(program), *MOVING]
             result = subprocess.run(command, capture_output=True, text=True, check=False)
             if result.returncode != 0:
-                raise build.BuildError(f"{' '.join(emulator)}: {result.stderr.strip()}")
+                raise BuildError(f"{' '.join(emulator)}: {result.stderr.strip()}")
             said.append(result.stdout.strip())
         return "\n".join(said)
 
@@ -94,7 +97,7 @@ def try_out(model: Path) -> None:
             continue
         there = smoke(model, zig(target), [found])
         if there != here:
-            raise build.BuildError(f"{platform} gives other figures:\n{there}")
+            raise BuildError(f"{platform} gives other figures:\n{there}")
         print(f"{platform}: the same")
 
 
@@ -102,17 +105,17 @@ def main(argv: list[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(description="FMUs with binaries for every platform.")
     parser.add_argument("--model", default="vehicle", help="folder of fmu/, or a path")
-    parser.add_argument("--out", type=Path, default=build.FMU_DIRECTORY.parent / "dist")
+    parser.add_argument("--out", type=Path, default=FMU_DIRECTORY.parent / "dist")
     options = parser.parse_args(argv)
     try:
         model = build.model_folder(options.model)
         fmus = {platform: compiled(model, platform) for platform in TARGETS}
-        for index, fmi in enumerate(build.VERSIONS):
+        for index, fmi in enumerate(VERSIONS):
             platforms = FMI2_PLATFORMS if fmi == 2 else tuple(TARGETS)
             first, *others = [fmus[platform][index] for platform in platforms]
             print(merge(first, others, options.out))
         try_out(model)
-    except (build.BuildError, TableError) as error:
+    except (BuildError, TableError) as error:
         print(error, file=sys.stderr)
         return 2
     return 0

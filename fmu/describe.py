@@ -1,13 +1,13 @@
-"""XML and HTML of an FMU from its variable table, for FMI 2.0 and FMI 3.0."""
+"""``modelDescription.xml`` of an FMU from its variable table, for FMI 2.0 and FMI 3.0."""
 
-import html
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
-from variables import TIME_REFERENCE, Table, Variable
+from table import TIME_REFERENCE, Table, TypeDefinition, Variable
 
 TOOL = "suspension-cosim fmu/build.py"
+NO_FEEDTHROUGH = ""  # inputs act over the step that follows: no output depends on one directly
 FMI2_TYPES = {"Float64": "Real", "Boolean": "Boolean", "String": "String"}
 
 
@@ -49,8 +49,7 @@ def _root(table: Table, version: str, fmi: str, token: dict[str, str]) -> ET.Ele
     )
 
 
-def _shared_head(root: ET.Element, table: Table) -> None:
-    """Unit definitions and log categories, which both versions write alike."""
+def _units(root: ET.Element, table: Table) -> None:
     units = add(root, "UnitDefinitions")
     for unit in table.units:
         element = add(units, "Unit", name=unit.name)
@@ -61,6 +60,15 @@ def _shared_head(root: ET.Element, table: Table) -> None:
         for display in unit.display:
             offset = display.offset if display.offset else None
             add(element, "DisplayUnit", name=display.name, factor=display.factor, offset=offset)
+
+
+def _type_attributes(definition: TypeDefinition) -> dict[str, object]:
+    return {
+        "quantity": definition.name, "unit": definition.unit, "nominal": definition.nominal,
+    }  # fmt: skip
+
+
+def _categories(root: ET.Element, table: Table) -> None:
     categories = add(root, "LogCategories")
     for name, description in table.model["log_categories"]:
         add(categories, "Category", name=name, description=description)
@@ -80,6 +88,7 @@ def _real(variable: Variable) -> dict[str, object]:
     if variable.type != "Float64":
         return {}
     return {
+        "declaredType": variable.declared_type,
         "quantity": variable.quantity,
         "unit": variable.unit,
         "displayUnit": variable.display,
@@ -99,6 +108,23 @@ def _common(variable: Variable) -> dict[str, object]:
         "variability": variable.variability,
         "initial": {"output": "calculated", "parameter": "exact"}.get(variable.causality),
     }
+
+
+def _time(table: Table) -> dict[str, object]:
+    """The independent variable."""
+    declared = next((d.name for d in table.types if d.unit == "s"), None)
+    return {
+        "name": "time", "valueReference": TIME_REFERENCE, "description": "Simulation time",
+        "causality": "independent", "variability": "continuous", "declaredType": declared,
+        "unit": "s",
+    }  # fmt: skip
+
+
+def _depend(unknown: ET.Element, table: Table, output: Variable, number: dict[str, int]) -> None:
+    """What an output depends on at the start; without a word on it, importers assume everything."""
+    if output.name in table.initial:
+        knowns = sorted(number[name] for name in table.initial[output.name])
+        unknown.set("dependencies", " ".join(map(str, knowns)))
 
 
 def _set_start(element: ET.Element, variable: Variable) -> None:
@@ -122,19 +148,26 @@ def fmi2(table: Table, version: str, token: str, sources: Sequence[str]) -> byte
     files = add(simulation, "SourceFiles")
     for name in sources:
         add(files, "File", name=name)
-    _shared_head(root, table)
+    _units(root, table)
+    types = add(root, "TypeDefinitions") if table.types else root
+    for definition in table.types:
+        add(add(types, "SimpleType", name=definition.name), "Real", **_type_attributes(definition))
+    _categories(root, table)
     _experiment(root, table)
     variables = add(root, "ModelVariables")
     for variable in table.variables:
         scalar = add(variables, "ScalarVariable", **_common(variable))
         _set_start(add(scalar, FMI2_TYPES[variable.type], **_real(variable)), variable)
+    time = _time(table)
+    own = {"declaredType": time.pop("declaredType"), "unit": time.pop("unit")}
+    add(add(variables, "ScalarVariable", **time), "Real", **own)
     structure = add(root, "ModelStructure")
     outputs, unknowns = add(structure, "Outputs"), add(structure, "InitialUnknowns")
-    for index, variable in enumerate(table.variables, start=1):
-        if variable.causality == "output":
-            # inputs act over the step that follows: nothing passes straight through
-            add(outputs, "Unknown", index=index).set("dependencies", "")
-            add(unknowns, "Unknown", index=index)  # at the start: on everything that can be set
+    index = {variable.name: i for i, variable in enumerate(table.variables, start=1)}
+    for variable in table.of_causality("output"):
+        add(outputs, "Unknown", index=index[variable.name]).set("dependencies", NO_FEEDTHROUGH)
+        unknown = add(unknowns, "Unknown", index=index[variable.name])
+        _depend(unknown, table, variable, index)
     return document(root)
 
 
@@ -149,13 +182,14 @@ def fmi3(table: Table, version: str, token: str) -> bytes:
         canSerializeFMUState=True,
         canHandleVariableCommunicationStepSize=True,
     )
-    _shared_head(root, table)
+    _units(root, table)
+    types = add(root, "TypeDefinitions") if table.types else root
+    for definition in table.types:
+        add(types, "Float64Type", name=definition.name, **_type_attributes(definition))
+    _categories(root, table)
     _experiment(root, table)
     variables = add(root, "ModelVariables")
-    add(
-        variables, "Float64", name="time", valueReference=TIME_REFERENCE,
-        description="Simulation time", causality="independent", variability="continuous", unit="s",
-    )  # fmt: skip
+    add(variables, "Float64", **_time(table))
     structure = add(root, "ModelStructure")
     for variable in table.variables:
         element = add(variables, variable.type, **_common(variable), **_real(variable))
@@ -163,70 +197,12 @@ def fmi3(table: Table, version: str, token: str) -> bytes:
             ET.SubElement(element, "Start", {"value": str(variable.start)})
         elif variable.type != "String":
             _set_start(element, variable)
-    outputs = [v.reference for v in table.variables if v.causality == "output"]
-    for reference in outputs:
-        add(structure, "Output", valueReference=reference).set("dependencies", "")
-    for reference in outputs:
-        add(structure, "InitialUnknown", valueReference=reference)
+    reference = {variable.name: variable.reference for variable in table.variables}
+    outputs = table.of_causality("output")
+    for variable in outputs:
+        output = add(structure, "Output", valueReference=variable.reference)
+        output.set("dependencies", NO_FEEDTHROUGH)
+    for variable in outputs:
+        unknown = add(structure, "InitialUnknown", valueReference=variable.reference)
+        _depend(unknown, table, variable, reference)
     return document(root)
-
-
-def build_description(table: Table, sources: Sequence[str], options: str) -> bytes:
-    """``sources/buildDescription.xml`` of FMI 3.0."""
-    root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    configuration = add(root, "BuildConfiguration", modelIdentifier=table.model["identifier"])
-    files = add(configuration, "SourceFileSet", language="C11", compilerOptions=options)
-    for name in sources:
-        add(files, "SourceFile", name=name)
-    add(configuration, "Library", name="m", external=True, description="C mathematics library")
-    return document(root)
-
-
-def terminals(table: Table) -> bytes:
-    """``terminalsAndIcons/terminalsAndIcons.xml`` of FMI 3.0: variables that belong together."""
-    root = ET.Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
-    group = add(root, "Terminals")
-    for name, terminal in table.terminals.items():
-        element = add(
-            group, "Terminal", name=name, matchingRule="plug",
-            terminalKind=terminal.get("kind"), description=terminal.get("description"),
-        )  # fmt: skip
-        for member in terminal["members"]:
-            add(
-                element, "TerminalMemberVariable",
-                variableName=member, memberName=member, variableKind="signal",
-            )  # fmt: skip
-    return document(root)
-
-
-def _cells(variable: Variable) -> list[str]:
-    limits = ["" if math.isinf(v) else f"{v:g}" for v in (variable.minimum, variable.maximum)]
-    start = "" if variable.causality == "output" else text(variable.start)
-    kind = variable.variability if variable.causality == "parameter" else variable.causality
-    return [variable.name, kind, variable.unit, start, *limits, variable.description]
-
-
-def documentation(table: Table, version: str) -> bytes:
-    """``documentation/index.html``: what the model is and every variable."""
-    model = table.model
-    heads = ("name", "kind", "unit", "start", "min", "max", "description")
-    rows = "\n".join(
-        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in _cells(v)) + "</tr>"
-        for v in table.variables
-    )
-    name = html.escape(model["name"])
-    return f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>{name}</title>
-<style>body{{font:15px sans-serif;margin:2em}}
-td,th{{text-align:left;padding:2px 12px 2px 0}}</style>
-</head><body>
-<h1>{name} {html.escape(version)}</h1>
-<p>{html.escape(model["description"])}</p>
-<p>Recommended communication step {model["step_size"]} s; inputs are held over a step.
-Values are in the units of the table. A parameter beyond its range, a value that is not finite and
-a call at the wrong time are refused with a message; a refused call changes nothing. An input beyond
-its range acts at its limit, with one warning.</p>
-<table><tr>{"".join(f"<th>{h}</th>" for h in heads)}</tr>
-{rows}
-</table></body></html>
-""".encode()

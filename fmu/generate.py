@@ -5,7 +5,7 @@
 
 import math
 
-from variables import FIRST_REFERENCE, STRING_SIZE, Table, Variable
+from table import FIRST_REFERENCE, STRING_SIZE, Table, Variable
 
 C_TYPES = {"Float64": "double", "Boolean": "int", "String": "char"}
 TABLE_NAMES = {"Float64": "reals", "Boolean": "booleans", "String": "strings"}

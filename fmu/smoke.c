@@ -1,20 +1,15 @@
-/* Lives an FMU's life many times over, for the address and undefined-behaviour sanitizers (and their leak check):
- * instantiate, read and write every variable, step, save, serialise, go back, reset, free. Linked with a model's sources by
- * `fmu/build.py --sanitize`; exit code 0 if all went well and going back gave the same bytes. Arguments of the
- * form Name=value set variables. It ends with the sum of the last life's outputs, for comparison between platforms. */
+/* Lives an FMU's life many times over: instantiate, read and write every variable, step, save, serialise, go back,
+ * reset, free. Linked with a model's sources, with the sanitizers (make sanitize) or for another platform (make
+ * cross); exit code 0 if all went well and going back gave the same bytes. Arguments: --lives=n, --instances=n that
+ * are made and freed besides, and Name=value for start values. It ends with the sum of the last life's outputs, for
+ * comparison. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "instance.h"
+#include "face.h"
 
-#if SMOKE_FMI == 2
-#include "fmi2Functions.h"
-#else
-#include "fmi3Functions.h"
-#endif
-
-enum { LIVES = 50, STEPS = 20 };
+enum { STEPS = 20 };
 static const double H = 0.01;
 
 #define CHECK(condition)                                                                                               \
@@ -25,113 +20,19 @@ static const double H = 0.01;
         }                                                                                                              \
     } while (0)
 
-/* --- one small face for both versions ------------------------------------------------------------------------- */
-
-#if SMOKE_FMI == 2
-typedef fmi2FMUstate StateHandle;
-
-static void logger(void *environment, fmi2String name, fmi2Status status, fmi2String category, fmi2String message, ...)
+static void face_heard(void *env, int status, const char *category, const char *message)
 {
-    (void)environment;
-    if (status > fmi2Warning)
-        fprintf(stderr, "%s %d %s: %s\n", name, status, category, message);
-}
-
-static void *instantiate(const char *token, bool with_logger)
-{
-    static fmi2CallbackFunctions callbacks = {.logger = logger};
-    return fmi2Instantiate("smoke", fmi2CoSimulation, token, "file:///no%20where", with_logger ? &callbacks : NULL, 0, 1);
-}
-
-static bool initialise(void *c)
-{
-    return fmi2SetupExperiment(c, 0, 0.0, 0.0, 1, 10.0) <= fmi2Warning && fmi2EnterInitializationMode(c) == fmi2OK;
-}
-
-static bool step(void *c, int k) { return fmi2DoStep(c, k * H, H, fmi2False) <= fmi2Warning; }
-
-static bool read_all(void *c, double reals[], int booleans[], const char *strings[], const unsigned *vr[3])
-{
-    return fmi2GetReal(c, vr[0], model_tables[0].count, reals) <= fmi2Warning
-           && fmi2GetBoolean(c, vr[1], model_tables[1].count, booleans) <= fmi2Warning
-           && fmi2GetString(c, vr[2], model_tables[2].count, strings) <= fmi2Warning;
-}
-
-static bool write_real(void *c, unsigned vr, double value) { return fmi2SetReal(c, &vr, 1, &value) == fmi2OK; }
-static bool write_string(void *c, unsigned vr, const char *value) { return fmi2SetString(c, &vr, 1, &value) == fmi2OK; }
-
-#define LEAVE(c) (fmi2ExitInitializationMode(c) <= fmi2Warning)
-#define TERMINATE fmi2Terminate
-#define RESET fmi2Reset
-#define FREE fmi2FreeInstance
-#define STATE_GET fmi2GetFMUstate
-#define STATE_SET fmi2SetFMUstate
-#define STATE_FREE fmi2FreeFMUstate
-#define STATE_SIZE fmi2SerializedFMUstateSize
-#define STATE_WRITE fmi2SerializeFMUstate
-#define STATE_READ fmi2DeSerializeFMUstate
-typedef fmi2Byte Byte;
-#else
-typedef fmi3FMUState StateHandle;
-
-static void logger(void *environment, fmi3Status status, fmi3String category, fmi3String message)
-{
-    (void)environment;
-    if (status > fmi3Warning)
+    (void)env;
+    if (status > STATUS_WARNING)
         fprintf(stderr, "%d %s: %s\n", status, category, message);
 }
 
-static void *instantiate(const char *token, bool with_logger)
-{
-    return fmi3InstantiateCoSimulation("smoke", token, "/no where", false, true, false, false, NULL, 0, NULL,
-                                       with_logger ? logger : NULL, NULL);
-}
-
-static bool initialise(void *c) { return fmi3EnterInitializationMode(c, false, 0.0, 0.0, true, 10.0) <= fmi3Warning; }
-
-static bool step(void *c, int k)
-{
-    bool event, end, early;
-    double last;
-    return fmi3DoStep(c, k * H, H, false, &event, &end, &early, &last) <= fmi3Warning && last == k * H + H;
-}
-
-static bool read_all(void *c, double reals[], int booleans[], const char *strings[], const unsigned *vr[3])
-{
-    bool values[MODEL_STRING_SIZE];
-    size_t n = model_tables[1].count;
-    CHECK(n <= MODEL_STRING_SIZE);
-    bool fine = fmi3GetFloat64(c, vr[0], model_tables[0].count, reals, model_tables[0].count) <= fmi3Warning
-                && fmi3GetBoolean(c, vr[1], n, values, n) <= fmi3Warning
-                && fmi3GetString(c, vr[2], model_tables[2].count, strings, model_tables[2].count) <= fmi3Warning;
-    for (size_t i = 0; i < n; i++)
-        booleans[i] = fine && values[i];
-    return fine;
-}
-
-static bool write_real(void *c, unsigned vr, double value) { return fmi3SetFloat64(c, &vr, 1, &value, 1) == fmi3OK; }
-static bool write_string(void *c, unsigned vr, const char *v) { return fmi3SetString(c, &vr, 1, &v, 1) == fmi3OK; }
-
-#define LEAVE(c) (fmi3ExitInitializationMode(c) <= fmi3Warning)
-#define TERMINATE fmi3Terminate
-#define RESET fmi3Reset
-#define FREE fmi3FreeInstance
-#define STATE_GET fmi3GetFMUState
-#define STATE_SET fmi3SetFMUState
-#define STATE_FREE fmi3FreeFMUState
-#define STATE_SIZE fmi3SerializedFMUStateSize
-#define STATE_WRITE fmi3SerializeFMUState
-#define STATE_READ fmi3DeserializeFMUState
-typedef fmi3Byte Byte;
-#endif
-
-/* --- the life ---------------------------------------------------------------------------------------------------- */
-
+/* Values of all variables, by kind. */
 typedef struct {
     unsigned *vr[3];
     double *reals;
-    int *booleans;
-    const char **strings;
+    Flag *flags;
+    const char **texts;
 } Buffers;
 
 static Buffers buffers_new(void)
@@ -142,9 +43,9 @@ static Buffers buffers_new(void)
         for (size_t i = 0; i < model_tables[kind].count; i++)
             b.vr[kind][i] = model_tables[kind].first + (unsigned)i;
     }
-    b.reals = calloc(model_tables[0].count + 1, sizeof *b.reals);
-    b.booleans = calloc(model_tables[1].count + 1, sizeof *b.booleans);
-    b.strings = calloc(model_tables[2].count + 1, sizeof *b.strings);
+    b.reals = calloc(model_tables[KIND_REAL].count + 1, sizeof *b.reals);
+    b.flags = calloc(model_tables[KIND_BOOLEAN].count + 1, sizeof *b.flags);
+    b.texts = calloc(model_tables[KIND_STRING].count + 1, sizeof *b.texts);
     return b;
 }
 
@@ -153,51 +54,64 @@ static void buffers_free(Buffers *b)
     for (int kind = 0; kind < 3; kind++)
         free(b->vr[kind]);
     free(b->reals);
-    free(b->booleans);
-    free(b->strings);
+    free(b->flags);
+    free(b->texts);
 }
 
-static bool read_into(void *c, Buffers *b)
+static bool read_all(void *c, Buffers *b)
 {
-    return read_all(c, b->reals, b->booleans, b->strings, (const unsigned **)b->vr);
+    const size_t reals = model_tables[KIND_REAL].count, flags = model_tables[KIND_BOOLEAN].count;
+    const size_t texts = model_tables[KIND_STRING].count;
+    (void)reals, (void)flags, (void)texts; /* FMI 2 names each only once */
+    return GET_REALS(c, b->vr[KIND_REAL], reals, b->reals, reals) <= STATUS_WARNING
+           && GET_FLAGS(c, b->vr[KIND_BOOLEAN], flags, b->flags, flags) <= STATUS_WARNING
+           && GET_TEXTS(c, b->vr[KIND_STRING], texts, b->texts, texts) <= STATUS_WARNING;
 }
 
-static const char *setting(const VariableInfo *info, int n, char **settings)
+static const char *setting(const char *name, int n, char **settings)
 {
-    size_t length = strlen(info->name);
+    size_t length = strlen(name);
     for (int i = 1; i < n; i++)
-        if (strncmp(settings[i], info->name, length) == 0 && settings[i][length] == '=')
+        if (strncmp(settings[i], name, length) == 0 && settings[i][length] == '=')
             return settings[i] + length + 1;
     return NULL;
 }
 
-/* Every variable that may be set gets its start value. */
+/* Every variable that may be set gets its start value, or the one of the command line. */
 static void write_starts(void *c, int n, char **settings)
 {
-    for (size_t i = 0; i < model_tables[KIND_REAL].count; i++) {
-        const VariableInfo *info = &model_tables[KIND_REAL].rows[i];
-        unsigned vr = model_tables[KIND_REAL].first + (unsigned)i;
-        const char *given = setting(info, n, settings);
-        const double start = *(const double *)((const char *)&model_start + info->offset);
-        if (info->role != OUTPUT)
-            CHECK(write_real(c, vr, given ? strtod(given, NULL) : start));
-    }
-    for (size_t i = 0; i < model_tables[KIND_STRING].count; i++) {
-        const VariableInfo *info = &model_tables[KIND_STRING].rows[i];
-        const char *given = setting(info, n, settings);
-        if (info->role != OUTPUT)
-            CHECK(write_string(c, model_tables[KIND_STRING].first + (unsigned)i,
-                               given ? given : (const char *)&model_start + info->offset));
-    }
+    for (int kind = KIND_REAL; kind <= KIND_STRING; kind++)
+        for (size_t i = 0; i < model_tables[kind].count; i++) {
+            const VariableInfo *info = &model_tables[kind].rows[i];
+            const unsigned vr = model_tables[kind].first + (unsigned)i;
+            const char *at = (const char *)&model_start + info->offset, *given = setting(info->name, n, settings);
+            const char *text = given ? given : at;
+            if (info->role == OUTPUT)
+                continue;
+            const double real = given && kind == KIND_REAL ? strtod(given, NULL) : 0.0;
+            if (kind == KIND_REAL)
+                CHECK(SET_REALS(c, &vr, 1, given ? &real : (const double *)at, 1) == STATUS_OK);
+            if (kind == KIND_BOOLEAN)
+                CHECK(SET_FLAGS(c, &vr, 1, &(Flag){*(const int *)at != 0}, 1) == STATUS_OK);
+            if (kind == KIND_STRING)
+                CHECK(SET_TEXTS(c, &vr, 1, &text, 1) == STATUS_OK);
+        }
+}
+
+static bool step(void *c, int k)
+{
+    double reached;
+    return face_step(c, k * H, H, &reached) <= STATUS_WARNING && reached == k * H + H;
 }
 
 static void wrong_calls(void *c)
 {
-    double value = 0.0;
-    CHECK(!write_real(c, 123456789u, value)); /* no such variable */
-    CHECK(!write_real(c, 0, NAN));
+    const unsigned none = 123456789u, first = 0;
+    double value = NAN;
+    CHECK(GET_REALS(c, &none, 1, &value, 1) == STATUS_ERROR);
+    CHECK(SET_REALS(c, &first, 1, &value, 1) == STATUS_ERROR);
     CHECK(!step(c, 1000)); /* not where the instance stands */
-    CHECK(!initialise(c));
+    CHECK(face_enter(c, 0.0, false, 0.0) == STATUS_ERROR);
 }
 
 static void run(void *c, int from, int to)
@@ -210,57 +124,78 @@ static StateHandle through_bytes(void *c, StateHandle state)
 {
     size_t size = 0;
     StateHandle copy = NULL;
-    CHECK(STATE_SIZE(c, state, &size) == 0);
+    CHECK(STATE_SIZE(c, state, &size) == STATUS_OK);
     Byte *bytes = malloc(size);
-    CHECK(bytes && STATE_WRITE(c, state, bytes, size) == 0);
-    CHECK(STATE_READ(c, bytes, size, &copy) == 0);
+    CHECK(bytes && WRITE_STATE(c, state, bytes, size) == STATUS_OK);
+    CHECK(READ_STATE(c, bytes, size, &copy) == STATUS_OK);
     free(bytes);
     return copy;
 }
 
-static void live(bool with_logger, Buffers *now, Buffers *again, int n, char **settings)
+static void *instance(bool logger, fmi2CallbackFunctions *callbacks)
 {
-    void *c = instantiate(model_token, with_logger);
+    return face_instantiate("smoke", model_token, "/no where", logger, true, NULL, callbacks);
+}
+
+static void live(bool logger, Buffers *now, Buffers *again, int n, char **settings)
+{
+    fmi2CallbackFunctions callbacks[2];
+    void *c = instance(logger, &callbacks[0]);
     CHECK(c);
     write_starts(c, n, settings);
-    CHECK(initialise(c) && read_into(c, now)); /* outputs on demand, before the mode is left */
+    CHECK(face_enter(c, 0.0, true, 10.0) == STATUS_OK && read_all(c, now)); /* on demand, before the mode is left */
     write_starts(c, n, settings);
-    CHECK(LEAVE(c));
-    if (!with_logger)
+    CHECK(FMI(ExitInitializationMode)(c) <= STATUS_WARNING);
+    if (!logger)
         wrong_calls(c);
     run(c, 0, STEPS);
     StateHandle saved = NULL;
-    CHECK(STATE_GET(c, &saved) == 0);
+    CHECK(GET_STATE(c, &saved) == STATUS_OK);
     StateHandle copy = through_bytes(c, saved);
     run(c, STEPS, 2 * STEPS);
-    CHECK(read_into(c, now));
+    CHECK(read_all(c, now));
 
-    void *other = instantiate(model_token, with_logger); /* the state moves into an instance that has never run */
-    CHECK(other && STATE_SET(other, copy) == 0);
+    void *other = instance(logger, &callbacks[1]); /* the state moves into an instance that has never run */
+    CHECK(other && SET_STATE(other, copy) <= STATUS_WARNING);
     run(other, STEPS, 2 * STEPS);
-    CHECK(read_into(other, again));
-    CHECK(memcmp(now->reals, again->reals, model_tables[0].count * sizeof(double)) == 0);
-    FREE(other); /* without termination */
+    CHECK(read_all(other, again));
+    CHECK(memcmp(now->reals, again->reals, model_tables[KIND_REAL].count * sizeof(double)) == 0);
+    FMI(FreeInstance)(other); /* without termination */
 
-    CHECK(STATE_SET(c, saved) == 0 && STATE_GET(c, &saved) == 0);
-    CHECK(TERMINATE(c) == 0 && RESET(c) == 0 && initialise(c) && LEAVE(c));
+    CHECK(SET_STATE(c, saved) <= STATUS_WARNING && GET_STATE(c, &saved) == STATUS_OK);
+    CHECK(FMI(Terminate)(c) == STATUS_OK && FMI(Reset)(c) == STATUS_OK);
+    CHECK(face_enter(c, 0.0, true, 10.0) == STATUS_OK && FMI(ExitInitializationMode)(c) <= STATUS_WARNING);
     run(c, 0, 1);
-    CHECK(STATE_FREE(c, &saved) == 0 && STATE_FREE(c, &copy) == 0 && STATE_FREE(c, &copy) == 0);
-    FREE(c);
+    for (int i = 0; i < 2; i++) /* the second time with NULL */
+        CHECK(FREE_STATE(c, &saved) == STATUS_OK && FREE_STATE(c, &copy) == STATUS_OK);
+    FMI(FreeInstance)(c);
+}
+
+static double sum_of_outputs(const Buffers *b)
+{
+    double sum = 0.0;
+    for (size_t i = MODEL_OUTPUTS_BEGIN; i < MODEL_OUTPUTS_END; i++)
+        sum += b->reals[i];
+    return sum;
 }
 
 int main(int argc, char **argv)
 {
+    const char *asked = setting("--lives", argc, argv), *more = setting("--instances", argc, argv);
+    const int lives = asked ? atoi(asked) : 50, instances = more ? atoi(more) : 0;
     Buffers now = buffers_new(), again = buffers_new();
-    CHECK(!instantiate("not the token", false));
-    for (int i = 0; i < LIVES; i++)
+    fmi2CallbackFunctions callbacks;
+    CHECK(!face_instantiate("smoke", "not the token", NULL, false, false, NULL, &callbacks));
+    for (int i = 0; i < lives; i++)
         live(i != 1, &now, &again, argc, argv);
-    double sum = 0.0;
-    for (size_t i = 0; i < model_tables[KIND_REAL].count; i++)
-        if (model_tables[KIND_REAL].rows[i].role == OUTPUT)
-            sum += again.reals[i];
+    for (int i = 0; i < instances; i++) {
+        void *c = instance(false, &callbacks);
+        CHECK(c && !read_all(c, &now)); /* outputs have no value yet */
+        FMI(FreeInstance)(c);
+    }
+    printf("FMI %d: %d lives of " MODEL_NAME " and %d instances more, no fault; outputs add up to %.10g\n", FACE_FMI,
+           lives, instances, sum_of_outputs(&again));
     buffers_free(&now);
     buffers_free(&again);
-    printf("FMI %d: %d lives of " MODEL_NAME ", no fault; outputs add up to %.10g\n", SMOKE_FMI, LIVES, sum);
     return 0;
 }

@@ -6,15 +6,24 @@ A name holding ``@`` stands for four variables, one to a corner, and becomes an 
 import math
 import re
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-CORNERS = ("FL", "FR", "RL", "RR")
+from structure import initial_dependencies
+from table import (
+    CORNERS,
+    FIRST_REFERENCE,
+    DisplayUnit,
+    Field,
+    Start,
+    Table,
+    TypeDefinition,
+    Unit,
+    Variable,
+)
+
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-FIRST_REFERENCE = {"Float64": 0, "Boolean": 100_000, "String": 200_000}
-TIME_REFERENCE = 999_999
-STRING_SIZE = 1024
 LAYER_CATEGORIES = (
     ("logStatusError", "A call failed; the message says why"),
     ("logStatusWarning", "A call succeeded with something the user should know"),
@@ -24,6 +33,7 @@ VARIABILITIES = {
     "input": ("continuous", "discrete"),
     "output": ("continuous", "discrete"),
 }
+TABLES = {"model", "units", "types", "group", "terminals", "initial"}
 MODEL_KEYS = {
     "name", "identifier", "description", "author", "license", "log_categories",
     "step_size", "stop_time",
@@ -33,75 +43,9 @@ VARIABLE_KEYS = {
     "causality", "variability",
 }  # fmt: skip
 
-Start = float | bool | str
-
 
 class TableError(Exception):
     """Everything wrong with a variable table, one sentence to a line."""
-
-
-@dataclass(frozen=True)
-class DisplayUnit:
-    """A unit for people: value in it = factor * SI value + offset."""
-
-    name: str
-    factor: float
-    offset: float
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit by its SI exponents: SI value = factor * value."""
-
-    name: str
-    base: dict[str, int]
-    factor: float
-    display: tuple[DisplayUnit, ...]
-
-
-@dataclass(frozen=True)
-class Variable:
-    """One scalar variable, as an FMU shows it."""
-
-    name: str
-    type: str
-    causality: str
-    variability: str
-    description: str
-    start: Start
-    field: str  # how C addresses it inside Variables: "Car_ax" or "Car_Fz[2]"
-    reference: int = 0
-    unit: str = ""
-    display: str = ""
-    quantity: str = ""
-    minimum: float = -math.inf
-    maximum: float = math.inf
-    nominal: float | None = None
-
-
-@dataclass(frozen=True)
-class Field:
-    """One member of the C struct ``Variables``."""
-
-    name: str
-    type: str
-    count: int  # 4 for an array over the corners, else 1
-    comment: str
-
-
-@dataclass(frozen=True)
-class Table:
-    """A whole ``variables.toml``."""
-
-    model: dict[str, Any]
-    units: tuple[Unit, ...]
-    fields: tuple[Field, ...]
-    variables: tuple[Variable, ...]
-    terminals: dict[str, dict[str, Any]] = field(default_factory=dict)
-
-    def of_type(self, kind: str) -> list[Variable]:
-        """Variables of one type, in the order of their value references."""
-        return [v for v in self.variables if v.type == kind]
 
 
 def field_name(name: str) -> str:
@@ -209,16 +153,6 @@ def _expand(raw: dict[str, Any], problems: list[str]) -> tuple[Field, list[Varia
     return Field(c_name, kind, len(corners), comment), variables
 
 
-def _number(variables: list[Variable]) -> tuple[Variable, ...]:
-    """Value references: counted up within each type, in the order of the table."""
-    following = dict(FIRST_REFERENCE)
-    numbered = []
-    for v in variables:
-        numbered.append(Variable(**{**vars(v), "reference": following[v.type]}))
-        following[v.type] += 1
-    return tuple(numbered)
-
-
 def _repeated(names: list[str], what: str) -> list[str]:
     twice = sorted({name for name in names if names.count(name) > 1})
     return [f"{name}: this {what} appears twice" for name in twice]
@@ -235,16 +169,54 @@ def _read_model(raw: dict[str, Any], problems: list[str]) -> dict[str, Any]:
     return {"step_size": 0.01, "stop_time": 10.0, **raw, "log_categories": categories}
 
 
+def _read_types(
+    raw: dict[str, Any], units: dict[str, Unit], problems: list[str]
+) -> tuple[TypeDefinition, ...]:
+    """Type definitions; once there are any, every unit has one."""
+    types = tuple(
+        TypeDefinition(name, t.get("unit", ""), float(t["nominal"]) if "nominal" in t else None)
+        for name, t in raw.items()
+    )
+    for name, definition in raw.items():
+        problems += _unknown(f"type '{name}'", set(definition), {"unit", "nominal"})
+    of_type = [definition.unit for definition in types]
+    problems += [
+        f"type '{d.name}': unit '{d.unit}' is not defined in [units]"
+        for d in types
+        if d.unit not in units
+    ]
+    problems += _repeated(of_type, "unit of a type")
+    problems += [
+        f"unit '{name}': no type in [types] has it"
+        for name in units
+        if types and name not in of_type
+    ]
+    return types
+
+
+def _finish(variables: list[Variable], types: tuple[TypeDefinition, ...]) -> tuple[Variable, ...]:
+    """Types by their units, and value references: counted up within each type of value."""
+    following = dict(FIRST_REFERENCE)
+    declared = {definition.unit: definition.name for definition in types}
+    finished = []
+    for v in variables:
+        own = declared.get(v.unit, "") if v.type == "Float64" else ""
+        finished.append(replace(v, reference=following[v.type], declared_type=own))
+        following[v.type] += 1
+    return tuple(finished)
+
+
 def read_table(path: Path) -> Table:
     """Read and check ``variables.toml``; raises TableError with all problems at once."""
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise TableError(f"{path}: {error}") from error
-    problems = _unknown(path.name, set(raw), {"model", "units", "group", "terminals"})
+    problems = _unknown(path.name, set(raw), TABLES)
     model = _read_model(raw.get("model", {}), problems)
     units = {n: _read_unit(n, u, problems) for n, u in raw.get("units", {}).items()}
-    units.setdefault("s", Unit("s", {"s": 1}, 1.0, ()))  # of FMI 3's independent variable
+    units.setdefault("s", Unit("s", {"s": 1}, 1.0, ()))  # of the independent variable
+    types = _read_types(raw.get("types", {}), units, problems)
     fields, variables = [], []
     for group in raw.get("group", []):
         common = {key: value for key, value in group.items() if key != "variables"}
@@ -255,7 +227,7 @@ def read_table(path: Path) -> Table:
             variables += expanded
             for variable in expanded:
                 problems += _check(variable, units, merged)
-    problems += _repeated([v.name for v in variables], "variable")
+    problems += _repeated([*(v.name for v in variables), *(d.name for d in types)], "name")
     problems += _repeated([f.name for f in fields], "C name")
     terminals = raw.get("terminals", {})
     names = {v.name for v in variables}
@@ -265,6 +237,10 @@ def read_table(path: Path) -> Table:
         for n in terminal.get("members", [])
         if n not in names
     ]
+    outputs = [v.name for v in variables if v.causality == "output"]
+    knowns = [v.name for v in variables if v.causality != "output"]
+    initial = initial_dependencies(raw.get("initial", {}), outputs, knowns, problems)
     if problems:
         raise TableError("\n".join(f"{path}: {p}" for p in problems))
-    return Table(model, tuple(units.values()), tuple(fields), _number(variables), terminals)
+    table = Table(model, tuple(units.values()), tuple(fields), _finish(variables, types))
+    return replace(table, types=types, terminals=terminals, initial=initial)

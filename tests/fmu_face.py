@@ -13,7 +13,10 @@ from fmpy import fmi2, fmi3
 ROOT = Path(__file__).resolve().parent.parent
 FIXTURE = ROOT / "tests" / "fmu_fixture"
 sys.path.insert(0, str(ROOT / "fmu"))  # fmu/ is a folder of scripts, not a package
-build, generate, variables = map(import_module, ("build", "generate", "variables"))
+build, describe, generate, package, reference, toolchain, variables = map(
+    import_module,
+    ("build", "describe", "generate", "package", "reference", "toolchain", "variables"),
+)
 
 OK, WARNING, ERROR = 0, 1, 3
 H = 0.1

@@ -20,7 +20,7 @@ from typing import Final
 
 import fmpy
 import pytest
-from fmu_face import build
+from fmu_face import build, toolchain
 from fmu_mutants import mutate
 
 from cosim.check.symbols import standard_functions
@@ -151,7 +151,8 @@ def objects(fmu: Path) -> tuple[Path, ...]:
     made = []
     for file in sorted(folder.glob("*.c")):
         target = file.with_suffix(".o")
-        run([*build.compiler(None), *FLAGS, "-c", file.name, "-o", target.name], folder)
+        includes = f"-I{_headers()}"
+        run([*build.compiler(None), *FLAGS, includes, "-c", file.name, "-o", target.name], folder)
         run(["objcopy", *renames, target.name], folder)
         made.append(target)
     return tuple(made)
@@ -195,7 +196,7 @@ def _binary(fmu: Path) -> str:
 
 
 def _headers() -> str:
-    return str(build.header_directory())
+    return str(toolchain.header_directory())
 
 
 def run(command: list[str], folder: Path) -> None:

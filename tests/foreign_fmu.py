@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from fmu_face import build
+from fmu_face import build, package, toolchain
 
 from cosim.errors import Problem
 from cosim.quantities import INPUT_QUANTITIES, OUTPUT_QUANTITIES
@@ -81,7 +81,7 @@ def parrot(
     target = build.target_platform()
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", ET.tostring(root))
-        archive.writestr(build.binary_path("parrot", version, target), _binary(version))
+        archive.writestr(package.binary_path("parrot", version, target), _binary(version))
     return path
 
 
@@ -118,7 +118,7 @@ def _add(parent: ET.Element, v: Variable, version: int) -> None:
 @cache
 def _binary(version: int) -> bytes:
     """The parrot's shared object; what it does not need to do is there, and refuses."""
-    header = build.header_directory() / f"fmi{version}Functions.h"
+    header = toolchain.header_directory() / f"fmi{version}Functions.h"
     names = re.findall(rf"#define (fmi{version}\w+) +fmi{version}FullName", header.read_text())
     refusals = "".join(f"__attribute__((weak)) int {n}(void) {{ return 3; }}\n" for n in names)
     folder = Path(tempfile.mkdtemp())

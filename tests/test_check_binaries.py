@@ -12,7 +12,7 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from fmu_face import build
+from fmu_face import build, package
 from fmu_mutants import mutate
 
 from cosim.check.binaries import here, meaning
@@ -22,7 +22,7 @@ from cosim.check.shared_library import LibraryError, read_library
 from cosim.check.symbols import required, standard_functions
 
 LINUX_ONLY = pytest.mark.skipif(sys.platform != "linux", reason="compiles ELF libraries")
-PLACE = {v: build.binary_path("lag", v, build.target_platform()) for v in (2, 3)}
+PLACE = {v: package.binary_path("lag", v, build.target_platform()) for v in (2, 3)}
 LOGGING = Path(fmpy.__file__).parent / "logging"
 
 

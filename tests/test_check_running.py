@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from fmu_face import ROOT, build
+from fmu_face import ROOT, build, package
 from fmu_mutants import MODEL, Edit, entry, mutate, put, version_of
 from fmu_rebuild import NEEDS_BINUTILS, Functions, rebuilt
 
@@ -304,7 +304,7 @@ def test_without_do_step_nothing_else_is_judged(
 
 
 def test_a_binary_that_does_not_load_is_not_run(fmus: dict[int, Path], tmp_path: Path) -> None:
-    binary = build.binary_path("lag", 2, build.target_platform())
+    binary = package.binary_path("lag", 2, build.target_platform())
     report = check(mutate(fmus[2], tmp_path / "m.fmu", files={binary: b"garbage"}))
     alone(report, "binary-format", binary)
     assert report.not_judged == ["how it runs (binary-format)"]

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from fmu_face import ROOT, build
+from fmu_face import ROOT, build, package
 from fmu_mutants import (
     MODEL,
     Edit,
@@ -33,7 +33,7 @@ from cosim.check.codes import CODES
 from cosim.check.finding import Report
 from cosim.errors import InputError
 
-BINARY = {v: build.binary_path("lag", v, build.target_platform()) for v in (2, 3)}
+BINARY = {v: package.binary_path("lag", v, build.target_platform()) for v in (2, 3)}
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 BUILD = "sources/buildDescription.xml"
 

@@ -112,7 +112,9 @@ def test_step_sizes_and_times_are_checked(make: Make) -> None:
     assert "step size is 0 s" in refused(face, lambda: face.fmu.doStep(0.0, 0.0))
     assert "step size is -0.1" in refused(face, lambda: face.fmu.doStep(0.0, -0.1))
     assert "step size is nan" in refused(face, lambda: face.fmu.doStep(0.0, math.nan))
-    assert "instance stands at 0 s" in refused(face, lambda: face.fmu.doStep(0.5, H))
+    for elsewhere in (0.5, math.inf, -math.inf, math.nan):
+        message = refused(face, lambda t=elsewhere: face.fmu.doStep(t, H))
+        assert "instance stands at 0 s" in message
     assert "pass the stop time 2 s" in refused(face, lambda: face.fmu.doStep(0.0, 2.5))
     for k in range(20):
         face.step(k)

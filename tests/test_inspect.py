@@ -12,7 +12,7 @@ import onnx
 import onnxruntime as ort
 import pytest
 from click.testing import CliRunner, Result
-from fmu_face import ROOT, build
+from fmu_face import ROOT, build, package
 from fmu_mutants import MODEL, add_unit, mutate, put, typed, variable
 
 from cosim.cli import main
@@ -118,7 +118,7 @@ def test_an_fmu(lag: Path) -> None:
     d = facts.data
     version = d["fmi_version"][0]
     assert (d["model_name"], d["model_identifier"], d["license"]) == ("Lag", "lag", "MIT")
-    place = build.binary_path("lag", int(version), build.target_platform())
+    place = package.binary_path("lag", int(version), build.target_platform())
     assert d["platforms"] == [place.split("/")[1]]
     assert d["counts"]["parameter"] == 9
     assert (d["counts"]["input"], d["counts"]["output"]) == (2, 6)

@@ -9,7 +9,7 @@ import zipfile
 from pathlib import Path
 from typing import Final
 
-from fmu_face import build
+from fmu_face import build, package, toolchain
 
 SOURCE: Final = Path(__file__).parent / "types_fmu" / "types.c"
 TOKEN: Final = "{0f4d4f5c-2d33-4c1e-9d6c-5d7a31b7c2aa}"
@@ -25,18 +25,18 @@ def types_fmu(path: Path, version: int) -> Path:
     """Write the FMU."""
     folder = path.parent
     root = _description(version)
-    header = (build.header_directory() / f"fmi{version}Functions.h").read_text()
+    header = (toolchain.header_directory() / f"fmi{version}Functions.h").read_text()
     names = re.findall(rf"#define (fmi{version}\w+) +fmi{version}FullName", header)
     weak = "".join(f"__attribute__((weak)) int {n}(void) {{ return 3; }}\n" for n in names)
     (folder / "refusals.c").write_text(weak)
     shutil.copy(SOURCE, folder)
-    headers = f"-I{build.header_directory()}"
+    headers = f"-I{toolchain.header_directory()}"
     flags = [f"-DFMI{version}", headers, "-fPIC", "-shared", "-w", "-fvisibility=default"]
     command = [*build.compiler(None), *flags, "types.c", "refusals.c", "-o", "types.so"]
     build.run_compiler(command, folder)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", ET.tostring(root))
-        target = build.binary_path("types", version, build.target_platform())
+        target = package.binary_path("types", version, build.target_platform())
         archive.write(folder / "types.so", target)
     return path
 

@@ -210,7 +210,7 @@ ModelStatus do_step(Instance *instance, const char *function, double t, double h
     if (!(h > 0.0) || !isfinite(h))
         return refuse(instance, "%s: the communication step size is %.17g s; it must be positive.", function, h);
     /* a master may count n*h or add up h: both are met if the slack is far above rounding and far below a step */
-    double slack = 1e-6 * h + 1e-12 * fabs(t);
+    double slack = 1e-6 * h + 1e-12 * fabs(progress->time);
     if (!(fabs(t - progress->time) <= slack))
         return refuse(instance, "%s: the communication point is %.17g s, but the instance stands at %.17g s.", function,
                       t, progress->time);

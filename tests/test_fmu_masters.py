@@ -1,0 +1,83 @@
+"""The vehicle FMUs in masters that are not ours: the same results, bit for bit.
+
+The step is a power of two: libcosim counts nanoseconds and passes the difference of two
+communication points as the step. With 10 ms that is 10 ms only to rounding, and so are the results.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import foreign_masters
+import numpy as np
+import numpy.typing as npt
+import pytest
+from foreign_masters import Task
+from vehicle_rig import INPUTS, cosine_bump, output_names, straight_road
+
+from cosim.fmi import Description, Slave
+from cosim.vehicle import builtin_fmu
+
+Array = npt.NDArray[np.float64]
+
+H = 1 / 128
+STEPS = 512  # 4 s
+START = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]  # of the inputs
+
+PAIRS = [("libcosimpy", 2), ("ecospy", 2), ("ecospy", 3)]
+
+
+def commands() -> Array:
+    """Inputs of every step (STEPS, 8), all of them changing at every step."""
+    t = H * np.arange(STEPS)
+    pedal = np.sin(2 * t)
+    dampers = [0.5 + 0.5 * np.sin((3 + i) * t + i) for i in range(4)]
+    held = [np.sin(3 * t), pedal.clip(0, 1), 0.4 * (-pedal).clip(0, 1), 0.8 + 0.2 * np.cos(t)]
+    return np.column_stack([*held, *dampers])
+
+
+@pytest.fixture(scope="module")
+def road(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("road") / "bump.crg"
+    return straight_road(path, lambda s, v: cosine_bump(s, 5.0, 3.0, 0.06) + 0.005 * v)
+
+
+def task(version: int, road: str, inputs: Array) -> Task:
+    parameters: dict[str, float | str] = {"Road.File": road, "Init.Velocity": 12.0}
+    fmu = Path(builtin_fmu(version))
+    return Task(fmu, H, parameters, INPUTS, inputs.tolist(), output_names())
+
+
+def ours(version: int, road: str, inputs: Array) -> Array:
+    slave = Slave(Description(builtin_fmu(version)), INPUTS, output_names())
+    slave.inputs[:] = START
+    slave.initialise({"Road.File": road, "Init.Velocity": 12.0})
+    rows = np.empty((len(inputs), len(output_names())))
+    for k, values in enumerate(inputs):
+        slave.inputs[:] = values
+        slave.step(k, H)
+        slave.read()
+        rows[k] = slave.outputs
+    slave.close()
+    return rows
+
+
+@pytest.mark.parametrize(("master", "version"), PAIRS)
+def test_four_seconds_over_a_bump(master: str, version: int, road: str) -> None:
+    rows = np.array(foreign_masters.run(master, task(version, road, commands())))
+    expected = ours(version, road, commands())
+    assert np.ptp(expected[:, output_names().index("Car.CFL.q0")]) > 0.02
+    np.testing.assert_array_equal(rows, expected)
+
+
+@pytest.mark.parametrize(("master", "version"), PAIRS)
+def test_a_command_beyond_its_range_does_not_stop_a_master(
+    master: str, version: int, road: str
+) -> None:
+    """It gets a Warning and goes on with the limit."""
+    within = commands()[:64]
+    within[:, 4:] = np.round(within[:, 4:])
+    beyond = within.copy()
+    beyond[:, 4:] += np.where(within[:, 4:] > 0.5, 0.7, -3.0)
+    rows = np.array(foreign_masters.run(master, task(version, road, beyond)))
+    np.testing.assert_array_equal(rows, ours(version, road, within))

@@ -1,0 +1,196 @@
+"""The archives of the vehicle FMUs: paths, documentation, licences, sources that rebuild."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+
+import fmpy
+import pytest
+import vehicle_fmus as fmus
+from fmu_face import ROOT, Face, package, toolchain
+from vehicle_rig import cosine_bump, straight_road
+
+H = 0.01
+HEADERS = {
+    "fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h",
+    "fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h",
+}  # fmt: skip
+PASTE = """#define PASTE(a, b) a##b
+#define PASTE_VALUES(a, b) PASTE(a, b)
+#define fmi2FullName(name) PASTE_VALUES(FMI2_FUNCTION_PREFIX, name)
+"""
+
+versions = pytest.mark.parametrize("version", fmus.VERSIONS)
+
+
+@versions
+def test_places_of_the_standard(version: int) -> None:
+    """FMI 3.0 and 2.0.4 (sections "FMU Distribution") have the same."""
+    names = fmus.names(version)
+    assert {
+        "modelDescription.xml", "documentation/index.html", "documentation/licenses/license.txt",
+        "terminalsAndIcons/terminalsAndIcons.xml", "sources/buildDescription.xml",
+        package.binary_path("vehicle", version, toolchain.target_platform()),
+    } <= names  # fmt: skip
+    assert not any("\\" in name or not name.isascii() for name in names)
+    top = {name.partition("/")[0] for name in names}
+    assert top == {
+        "modelDescription.xml", "documentation", "terminalsAndIcons", "sources", "binaries",
+        "resources", "extra",
+    }  # fmt: skip
+    licence = fmus.entry(version, "documentation/licenses/license.txt")
+    assert licence == (ROOT / "LICENSE").read_bytes()
+
+
+class Links(HTMLParser):
+    """Targets of links, and the text of table rows."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.targets += [value or "" for name, value in attrs if (tag, name) == ("a", "href")]
+
+
+@versions
+def test_the_page_describes_every_variable_and_its_links_lead_somewhere(version: int) -> None:
+    page = fmus.entry(version, "documentation/index.html").decode()
+    for name in fmus.variables(version):
+        assert name == "time" or f"<td>{name}</td>" in page
+    links = Links()
+    links.feed(page)
+    assert links.targets
+    assert {f"documentation/{target}" for target in links.targets} <= fmus.names(version)
+
+
+@versions
+def test_roads_and_resources_below_folders_of_any_name(
+    version: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Spaces, percent signs and letters of other scripts, in the resources' path and the road's."""
+    odd = "Prüfstand Süd 100%25 #2 悪路"
+    absolute = straight_road(
+        _made(tmp_path / odd) / "Straße é.crg",
+        lambda s, v: cosine_bump(s, 1.0, 2.0, 0.04) + 0.0 * v,
+    )
+    heights = []
+    with fmus.unzipped(version, f"{odd} ") as folder:
+        inside = folder / "resources" / odd
+        shutil.copy(absolute, _made(inside) / "Straße é.crg")
+        for road in (absolute, f"{odd}/Straße é.crg", ""):
+            face = Face(folder)
+            face.enter()
+            face["Road.File"], face["Init.x"] = road, 1.0
+            face.fmu.exitInitializationMode()
+            heights.append(face["Car.zRoadFL"])
+            assert face["Road.File"] == road
+            face.free()
+    assert heights[0] == heights[1] > 0.005
+    assert heights[2] == 0.0
+
+
+def bump_road(path: Path) -> str:
+    return straight_road(path, lambda s, v: cosine_bump(s, 1.0, 2.0, 0.04) + 0.0 * v)
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+# ---------------------------------------------------------------- sources
+
+
+@pytest.fixture(scope="module", params=fmus.VERSIONS, ids=["fmi2", "fmi3"])
+def rebuilt(request: pytest.FixtureRequest) -> Iterator[tuple[int, Path]]:
+    """The unzipped FMU, its binary replaced by one made from nothing but the archive.
+
+    FMI 2 as a plain importer would: the listed files and no option but for a shared object. FMI 3
+    by the build description.
+    """
+    version = request.param
+    with fmus.unzipped(version) as folder:
+        with zipfile.ZipFile(fmus.builtin_fmu(version)) as archive:
+            archive.extractall(folder)
+        binary = folder / package.binary_path("vehicle", version, toolchain.target_platform())
+        binary.unlink()
+        files, options = build_instructions(folder, version)
+        command = [*toolchain.compiler(None), *options, "-fPIC", "-shared", *files]
+        command += [f"-I../{package.HEADERS}", "-lm", "-o", str(binary)]
+        subprocess.run(command, cwd=folder / "sources", check=True)
+        yield version, folder
+
+
+def build_instructions(folder: Path, version: int) -> tuple[list[str], list[str]]:
+    """Files to compile and options, as the FMU states them."""
+    if version == 2:
+        root = ET.parse(folder / "modelDescription.xml").getroot()
+        return [str(f.get("name")) for f in root.findall("CoSimulation/SourceFiles/File")], []
+    root = ET.parse(folder / "sources" / "buildDescription.xml").getroot()
+    sources = root.find("BuildConfiguration/SourceFileSet")
+    assert sources is not None
+    assert sources.get("language") == "C11"
+    files = [str(f.get("name")) for f in sources.findall("SourceFile")]
+    return files, shlex.split(str(sources.get("compilerOptions")))
+
+
+def test_the_sources_alone_give_the_same_results(rebuilt: tuple[int, Path], tmp_path: Path) -> None:
+    version, folder = rebuilt
+    road = bump_road(tmp_path / "road.crg")
+    results = [drive(where, road) for where in (str(folder), str(fmus.builtin_fmu(version)))]
+    assert results[0] == results[1]
+    assert len(set(results[0])) == 151
+
+
+def drive(path: str, road: str) -> list[tuple[float, ...]]:
+    """A run by FMPy's own master over a bump."""
+    outputs = [n for n, v in fmus.variables(2).items() if v.causality == "output"]
+    start = {"Road.File": road, "Init.Velocity": 8.0, "DM.Gas": 0.4, "DM.Steer.Ang": 0.3}
+    result = fmpy.simulate_fmu(path, start_values=start, output=outputs, stop_time=1.5)
+    return [tuple(row) for row in result.tolist()]
+
+
+@versions
+def test_the_sources_are_what_the_standard_asks_for(version: int) -> None:
+    """All files are listed, no FMI header is among them, one prefix serves static linking."""
+    own = {n.removeprefix("sources/") for n in fmus.names(version) if n.startswith("sources/")}
+    assert not own & HEADERS
+    root = fmus.xml(version, "sources/buildDescription.xml")
+    listed = {str(f.get("name")) for f in root.iter("SourceFile")}
+    assert listed == {name for name in own if name.endswith(".c")}
+    if version == 2:
+        files = fmus.xml(2).findall("CoSimulation/SourceFiles/File")
+        assert {str(f.get("name")) for f in files} == listed
+    identifier = fmus.description(version).coSimulation.modelIdentifier
+    assert {c.get("modelIdentifier") for c in root.iter("BuildConfiguration")} == {identifier}
+
+
+@versions
+def test_a_prefix_for_static_linking(version: int, tmp_path: Path) -> None:
+    nm = shutil.which("nm")
+    if nm is None:
+        pytest.skip("needs nm")
+    for path in fmus.names(version):
+        if path.endswith((".c", ".h")):
+            (tmp_path / Path(path).name).write_bytes(fmus.entry(version, path))
+    if version == 2:  # FMPy's header leaves out what the standard's header does with the prefix
+        header = tmp_path / "fmi2Functions.h"
+        text = header.read_text(encoding="utf-8")
+        assert "#define fmi2FullName(name) name\n" in text
+        header.write_text(text.replace("#define fmi2FullName(name) name\n", PASTE))
+    prefix = f"-DFMI{version}_FUNCTION_PREFIX=vehicle_"
+    command = [*toolchain.compiler(None), "-std=c11", prefix, "-c", f"fmi{version}.c"]
+    subprocess.run([*command, "-o", "fmi.o"], cwd=tmp_path, check=True)
+    command = [nm, "--defined-only", "-g", "fmi.o"]
+    listing = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    names = {line.split()[-1] for line in listing.stdout.splitlines()}
+    assert f"vehicle_fmi{version}DoStep" in names
+    assert not any(name.startswith("fmi") for name in names)
