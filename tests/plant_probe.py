@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from fmu_face import ROOT, build, generate, variables
+from fmu_face import ROOT, build, generate, toolchain, variables
 
 Array = npt.NDArray[np.float64]
 
 VEHICLE = ROOT / "fmu" / "vehicle"
 PROBE = ROOT / "tests" / "vehicle_probe" / "probe.c"
-FLAGS = [*build.PORTABLE, "-Wall", "-Wextra", "-Werror"]
+FLAGS = [*toolchain.PORTABLE, "-Wall", "-Wextra", "-Werror"]
 
 MOTION = np.dtype(
     [
