@@ -156,7 +156,7 @@ INLINE void integrate(const Variables *p, const Vehicle *c, Memory *m, double h,
     evaluate(p, c, m, &m->x, w, &f[0]);
 }
 
-#if defined(__x86_64__) && defined(__GNUC__)
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(WITHOUT_AVX2)
 #define AVX2 __attribute__((target("avx2")))
 static AVX2 __attribute__((noinline)) void derivative_avx2(
     const Variables *p, const Vehicle *c, Memory *m, const State *x, Work *w, State *dx) {
