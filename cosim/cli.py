@@ -17,7 +17,7 @@ from pathlib import Path
 
 import click
 
-from cosim.errors import CosimError
+from cosim.errors import CosimError, explained
 
 INTERRUPTED = 130
 # Libraries would start a thread per core: slower for arrays as small as these, and sums in another
@@ -201,16 +201,13 @@ def _cores() -> int:
 def _failures_as_exit_codes() -> Iterator[None]:
     try:
         yield
-    except CosimError as error:
-        for problem in getattr(error, "problems", (error,)):
-            click.echo(f"error: {problem}", err=True)
-        sys.exit(error.exit_code)
     except BrokenPipeError:
         raise  # whoever read the output has seen enough; click ends quietly
-    except OSError as error:
-        where = f"'{error.filename}': " if error.filename else ""
-        click.echo(f"error: {where}{error.strerror or error}", err=True)
-        sys.exit(2)
+    except (CosimError, OSError) as error:
+        code, sentences = explained(error)
+        for sentence in sentences:
+            click.echo(f"error: {sentence}", err=True)
+        sys.exit(code)
     except KeyboardInterrupt:
         click.echo("interrupted; what was recorded until then is on disk", err=True)
         sys.exit(INTERRUPTED)

@@ -104,3 +104,12 @@ class NetworkError(CosimError):
     """A network could not be loaded, or failed while estimating."""
 
     exit_code: ClassVar[int] = 3
+
+
+def explained(error: CosimError | OSError) -> tuple[int, tuple[str, ...]]:
+    """Return the exit code of a failure and a sentence for each of its problems."""
+    if isinstance(error, CosimError):
+        problems = getattr(error, "problems", (error,))
+        return error.exit_code, tuple(str(problem) for problem in problems)
+    where = f"'{error.filename}': " if error.filename else ""
+    return InputError.exit_code, (f"{where}{error.strerror or error}",)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from types import FrameType
 
 from cosim.batch.job import Ended, Job
-from cosim.errors import CosimError
+from cosim.errors import CosimError, explained
 
 _busy = False
 
@@ -54,12 +54,8 @@ def _guarded(job: Job, work: Callable[[], Ended]) -> Ended:
     _busy = True
     try:
         return work()
-    except CosimError as error:
-        problems = tuple(str(problem) for problem in getattr(error, "problems", (error,)))
-        return Ended(job, error.exit_code, problems)
-    except OSError as error:
-        where = f"'{error.filename}': " if error.filename else ""
-        return Ended(job, 2, (f"{where}{error.strerror or error}",))
+    except (CosimError, OSError) as error:
+        return Ended(job, *explained(error))
     finally:
         _busy = False
 
