@@ -37,6 +37,11 @@ class Cones:
         )
 
 
+def bend_at_cones(spacing: float, clearance: float, width: float) -> float:
+    """Return |d2y/dx2| [1/m] at the cones of the path of a body so wide: that of a sine."""
+    return float((CONE_RADIUS + clearance + 0.5 * width) * (np.pi / spacing) ** 2)
+
+
 def path(cones: Cones, body: Body, clearance: float) -> PPoly:
     """Return y(x) [m] of the reference point, straight one spacing before and behind the cones.
 
@@ -45,7 +50,7 @@ def path(cones: Cones, body: Body, clearance: float) -> PPoly:
     """
     far = CONE_RADIUS + clearance
     left, right = far + body.right, -(far + body.left)
-    bend = 0.5 * (left - right) * (np.pi / cones.spacing) ** 2
+    bend = bend_at_cones(cones.spacing, clearance, body.width)
     states = [(right, 0.0, bend) if i % 2 else (left, 0.0, -bend) for i in range(cones.count)]
     straight = (0.0, 0.0, 0.0)
     ends = cones.first - cones.spacing, cones.first + cones.count * cones.spacing

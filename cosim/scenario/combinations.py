@@ -92,6 +92,8 @@ def _lateral(scenario: Scenario, manoeuvre: Manoeuvre, speed: float) -> float:
     if isinstance(manoeuvre, ConstantRadius) and scenario.road.radius_m is not None:
         return speed * speed / scenario.road.radius_m
     if isinstance(manoeuvre, Slalom):
-        half = 0.5 * scenario.vehicle.outline.width_m + manoeuvre.clearance_m + 0.15
-        return float(speed * speed * half * (3.1416 / manoeuvre.spacing_m) ** 2)
+        from cosim.manoeuvre.slalom import bend_at_cones  # which reads scenarios itself
+
+        width = scenario.vehicle.outline.width_m
+        return speed * speed * bend_at_cones(manoeuvre.spacing_m, manoeuvre.clearance_m, width)
     return 0.0
