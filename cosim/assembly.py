@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim import loop
 from cosim.comfort import ride_figures
@@ -22,7 +23,17 @@ from cosim.grip import grip_figures
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.manoeuvre import Plan, friction_of, manoeuvre_of, motion_of
 from cosim.manoeuvre.programme import ProgrammedDriver
-from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, TRUTH, Quantity
+from cosim.quantities import (
+    CHANNEL_QUANTITIES,
+    DAMPERS,
+    DRIVER,
+    GRIP_SHARE,
+    SEAT,
+    TRAVEL,
+    TRUTH,
+    TYRE_LOAD,
+    Quantity,
+)
 from cosim.recorder import Recorder, Signal
 from cosim.scenario.controllers import Passive
 from cosim.scenario.controllers import Skyhook as SkyhookSettings
@@ -85,7 +96,7 @@ class Assembly:
             comfort=_comfort(self.recorder),
             largest_deviation_m=self.driver.largest_deviation,
             manoeuvre=self.plan.figures(motion_of(self.recorder)),
-            grip=grip_figures(self.recorder.group("vehicle")[:, 14:18]),
+            grip=grip_figures(_recorded(self.recorder, GRIP_SHARE)),
         )
 
     def _unfinished(self) -> str:
@@ -264,9 +275,13 @@ def _steps(scenario: Scenario, plan: Plan) -> tuple[int, str]:
 
 
 def _comfort(recorder: Recorder) -> dict[str, float]:
-    ride = recorder.group("vehicle")[round(SETTLING_S / STEP_S) :]
-    seat, travel, load = ride[:, 3:6], ride[:, 6:10], ride[:, 10:14]
+    settled = round(SETTLING_S / STEP_S)
+    seat, travel, load = (_recorded(recorder, q)[settled:] for q in (SEAT, TRAVEL, TYRE_LOAD))
     return ride_figures(seat, travel, load, SAMPLE_RATE_HZ)
+
+
+def _recorded(recorder: Recorder, quantities: Sequence[Quantity]) -> npt.NDArray[np.float64]:
+    return recorder.columns([quantity.name for quantity in quantities])
 
 
 __all__ = ["Assembly", "RunResult", "assemble", "checked_parts", "record_groups"]

@@ -46,21 +46,20 @@ POSE: Final = (
     _own("Car.Yaw", "rad", "yaw angle"),
 )
 
-RIDE: Final = (
-    *(
-        _own(f"Car.Seat.a{axis}", "m/s2", f"acceleration at the seat, {axis}", False)
-        for axis in "xyz"
-    ),
-    *(
-        _own(f"Car.C{c}.q0", "m", f"wheel travel {c}, positive in compression", False)
-        for c in CORNERS
-    ),
-    *(_own(f"Car.Fz{c}", "N", f"vertical tyre force {c}", False) for c in CORNERS),
-    *(
-        _own(f"Car.GripShare{c}", "1", f"share of its grip that the tyre {c} uses", False)
-        for c in CORNERS
-    ),
+SEAT: Final = tuple(
+    _own(f"Car.Seat.a{axis}", "m/s2", f"acceleration at the seat, {axis}", False) for axis in "xyz"
 )
+TRAVEL: Final = tuple(
+    _own(f"Car.C{c}.q0", "m", f"wheel travel {c}, positive in compression", False) for c in CORNERS
+)
+TYRE_LOAD: Final = tuple(
+    _own(f"Car.Fz{c}", "N", f"vertical tyre force {c}", False) for c in CORNERS
+)
+GRIP_SHARE: Final = tuple(
+    _own(f"Car.GripShare{c}", "1", f"share of its grip that the tyre {c} uses", False)
+    for c in CORNERS
+)
+RIDE: Final = (*SEAT, *TRAVEL, *TYRE_LOAD, *GRIP_SHARE)
 
 STEER: Final = _own("DM.Steer.Ang", "rad", "steering-wheel angle, positive to the left")
 GAS: Final = _own("DM.Gas", "1", "accelerator pedal, 0 to 1")

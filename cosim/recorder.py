@@ -97,6 +97,11 @@ class Recorder:
         """Return the filled rows of a group, a view (rows, signals of the group)."""
         return self._data[: self._rows, self._slices[name]]
 
+    def columns(self, names: Sequence[str]) -> Array:
+        """Return the filled rows of signals by name, in that order, (rows, len(names))."""
+        known = [signal.name for signal in self.signals]
+        return self._data[: self._rows, [known.index(name) for name in names]]
+
     def signals_of(self, name: str) -> tuple[Signal, ...]:
         """Return the signals of a group."""
         return self.signals[self._slices[name]]

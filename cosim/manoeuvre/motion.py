@@ -46,19 +46,6 @@ class Motion:
 
 
 def motion_of(recorder: Recorder) -> Motion:
-    """Return the motion of a record with the groups channels, driver and vehicle."""
-    columns = {
-        signal.name: recorder.group(group)[:, i]
-        for group in ("channels", "vehicle")
-        for i, signal in enumerate(recorder.signals_of(group))
-    }
-    return Motion(
-        time=recorder.time,
-        x=columns["Car.tx"],
-        y=columns["Car.ty"],
-        yaw=columns["Car.Yaw"],
-        vx=columns["Car.vx"],
-        ay=columns["Car.ay"],
-        yaw_rate=columns["Car.YawRate"],
-        steering_wheel=columns["Steer.WhlAng"],
-    )
+    """Return the motion of a record with the groups channels and vehicle."""
+    names = ("Car.tx", "Car.ty", "Car.Yaw", "Car.vx", "Car.ay", "Car.YawRate", "Steer.WhlAng")
+    return Motion(recorder.time, *recorder.columns(names).T)

@@ -82,7 +82,7 @@ def drive(file: Path, surface: str) -> Row:
     result = assembly.run(None)
     truth, estimates, rows = estimates_of(assembly.recorder)
     metrics = {name: evaluate(estimates[name], truth, rows) for name in ESTIMATORS}
-    speed = assembly.recorder.group("channels")[rows, 6:7]
+    speed = assembly.recorder.columns(["Car.vx"])[rows]
     projected = float(np.sqrt(np.mean(np.square(truth[rows] + speed * np.sin(THETA0)))))
     return Row(
         str(scenario.paper_row), SURFACES[surface], result.simulated_s,
