@@ -48,9 +48,15 @@ def _road_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def lag_fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     """The small model of tests/fmu_fixture as an FMU of FMI 2.0 and of FMI 3.0, built once."""
     from fmu_face import FIXTURE, build
 
     paths = build.build(FIXTURE, tmp_path_factory.mktemp("lag"))
     return dict(zip((2, 3), paths, strict=True))
+
+
+@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
+def version(request: pytest.FixtureRequest) -> int:
+    """The major version of FMI."""
+    return int(request.param)

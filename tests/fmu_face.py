@@ -1,14 +1,18 @@
 """One face for an instance of FMI 2.0 or FMI 3.0: each test of the ceremony runs on both."""
 
+import contextlib
 import ctypes
 import os
 import sys
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import fmpy
+import pytest
 from fmpy import fmi2, fmi3
+from fmpy.fmi1 import FMICallException
 
 ROOT = Path(__file__).resolve().parent.parent
 FIXTURE = ROOT / "tests" / "fmu_fixture"
@@ -158,3 +162,28 @@ class Face:
     def free(self) -> None:
         """Free the instance and the library."""
         self.fmu.freeInstance()
+
+
+FaceT = TypeVar("FaceT", bound=Face)
+
+
+@contextlib.contextmanager
+def instances(kind: Callable[..., FaceT], *arguments: object) -> Iterator[Callable[..., FaceT]]:
+    """What makes instances of one kind from these arguments; they are freed at the end."""
+    with contextlib.ExitStack() as stack:
+
+        def new(**options: object) -> FaceT:
+            face = kind(*arguments, **options)
+            stack.callback(face.free)
+            return face
+
+        yield new
+
+
+def refused(face: Face, call: Callable[[], object]) -> str:
+    """The message of a call that must answer Error."""
+    with pytest.raises(FMICallException) as caught:
+        call()
+    assert caught.value.status == ERROR
+    assert face.messages[-1][:2] == (ERROR, "logStatusError")
+    return face.last

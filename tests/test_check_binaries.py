@@ -26,16 +26,6 @@ PLACE = {v: package.binary_path("lag", v, build.target_platform()) for v in (2, 
 LOGGING = Path(fmpy.__file__).parent / "logging"
 
 
-@pytest.fixture(scope="module")
-def fmus(lag_fmus: dict[int, Path]) -> dict[int, Path]:
-    return lag_fmus
-
-
-@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
-def version(request: pytest.FixtureRequest) -> int:
-    return int(request.param)
-
-
 @pytest.fixture
 def with_binary(
     fmus: dict[int, Path], version: int, tmp_path: Path

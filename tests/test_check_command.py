@@ -17,8 +17,8 @@ from cosim.cli import main
 
 
 @pytest.fixture(scope="module")
-def lag(lag_fmus: dict[int, Path]) -> Path:
-    return lag_fmus[2]
+def lag(fmus: dict[int, Path]) -> Path:
+    return fmus[2]
 
 
 def typed(*words: object) -> Result:

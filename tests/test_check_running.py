@@ -23,11 +23,6 @@ from cosim.check.trials.rules import other_value
 pytestmark = NEEDS_BINUTILS
 
 
-@pytest.fixture(scope="module")
-def fmus(lag_fmus: dict[int, Path]) -> dict[int, Path]:
-    return lag_fmus
-
-
 class Shared(Children):
     """One server of forks for many checks, which is quicker than one for each."""
 
@@ -49,11 +44,6 @@ def shared() -> Iterator[Shared]:
 @pytest.fixture(autouse=True)
 def _quick(shared: Shared, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dynamic, "Children", shared.again)
-
-
-@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
-def version(request: pytest.FixtureRequest) -> int:
-    return int(request.param)
 
 
 @pytest.fixture

@@ -38,16 +38,6 @@ TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 BUILD = "sources/buildDescription.xml"
 
 
-@pytest.fixture(scope="module")
-def fmus(lag_fmus: dict[int, Path]) -> dict[int, Path]:
-    return lag_fmus
-
-
-@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
-def version(request: pytest.FixtureRequest) -> int:
-    return int(request.param)
-
-
 @pytest.fixture
 def mutant(fmus: dict[int, Path], version: int, tmp_path: Path) -> Callable[..., Report]:
     """Checks a mutant of the fixture without running it."""

@@ -1,6 +1,5 @@
 """The FMI ceremony (fmu/common), on a small model, in both FMI versions."""
 
-import contextlib
 import ctypes
 import math
 from collections.abc import Callable, Iterator
@@ -11,15 +10,9 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmu_face import ERROR, FIXTURE, OK, WARNING, Face, H, build
+from fmu_face import ERROR, OK, WARNING, Face, H, instances, refused
 
 Make = Callable[..., Face]
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
-    paths = build.build(FIXTURE, tmp_path_factory.mktemp("fmus"))
-    return dict(zip((2, 3), paths, strict=True))
 
 
 @pytest.fixture(scope="module", params=[2, 3], ids=["fmi2", "fmi3"])
@@ -35,24 +28,8 @@ def folder(
 @pytest.fixture
 def make(folder: Path) -> Iterator[Make]:
     """Makes instances and frees them."""
-    with contextlib.ExitStack() as stack:
-
-        def new(**options: object) -> Face:
-            face = Face(folder, **options)
-            stack.callback(face.free)
-            return face
-
+    with instances(Face, folder) as new:
         yield new
-
-
-def refused(face: Face, call: Callable[[], object]) -> str:
-    """The message of a call that must answer Error."""
-    with pytest.raises(FMICallException) as caught:
-        call()
-    assert caught.value.status == ERROR
-    status, category, message = face.messages[-1]
-    assert (status, category) == (ERROR, "logStatusError")
-    return message
 
 
 def test_steps_follow_the_analytic_solution(make: Make) -> None:

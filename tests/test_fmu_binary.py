@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import math
 import re
@@ -14,7 +13,7 @@ from pathlib import Path
 import pytest
 import vehicle_fmus as fmus
 from fmpy.fmi1 import FMICallException
-from fmu_face import ERROR, OK, WARNING, Face, package, toolchain
+from fmu_face import ERROR, OK, WARNING, Face, instances, package, refused, toolchain
 
 Make = Callable[..., Face]
 H = 0.01
@@ -29,23 +28,8 @@ def folder(request: pytest.FixtureRequest) -> Iterator[Path]:
 @pytest.fixture
 def make(folder: Path) -> Iterator[Make]:
     """Makes instances and frees them."""
-    with contextlib.ExitStack() as stack:
-
-        def new(**options: object) -> Face:
-            face = Face(folder, **options)
-            stack.callback(face.free)
-            return face
-
+    with instances(Face, folder) as new:
         yield new
-
-
-def error(face: Face, call: Callable[[], object]) -> str:
-    """The message of a call that must answer Error."""
-    with pytest.raises(FMICallException) as caught:
-        call()
-    assert caught.value.status == ERROR
-    assert face.messages[-1][:2] == (ERROR, "logStatusError")
-    return face.last
 
 
 @pytest.mark.parametrize("version", fmus.VERSIONS)
@@ -72,19 +56,19 @@ def test_the_token_is_checked(make: Make) -> None:
 
 def test_calls_in_the_wrong_order_answer_error(make: Make) -> None:
     face = make()
-    assert "DoStep was called before initialization mode" in error(face, lambda: face.step(0, H))
-    assert "ExitInitializationMode" in error(face, face.fmu.exitInitializationMode)
-    assert "Terminate" in error(face, face.fmu.terminate)
-    assert "Car.vx has no value before" in error(face, lambda: face["Car.vx"])
+    assert "DoStep was called before initialization mode" in refused(face, lambda: face.step(0, H))
+    assert "ExitInitializationMode" in refused(face, face.fmu.exitInitializationMode)
+    assert "Terminate" in refused(face, face.fmu.terminate)
+    assert "Car.vx has no value before" in refused(face, lambda: face["Car.vx"])
     face.initialise()
-    assert "EnterInitializationMode" in error(face, face.fmu.enterInitializationMode)
-    assert "fixed parameter" in error(face, lambda: face.__setitem__("Body.Mass", 2000.0))
-    assert "is an output" in error(face, lambda: face.__setitem__("Car.vx", 1.0))
+    assert "EnterInitializationMode" in refused(face, face.fmu.enterInitializationMode)
+    assert "fixed parameter" in refused(face, lambda: face.__setitem__("Body.Mass", 2000.0))
+    assert "is an output" in refused(face, lambda: face.__setitem__("Car.vx", 1.0))
     face.step(0, H)
     face.fmu.terminate()
-    assert "after termination" in error(face, lambda: face.step(1, H))
-    assert "after termination" in error(face, lambda: face.__setitem__("DM.Gas", 0.5))
-    assert "Terminate was called after termination" in error(face, face.fmu.terminate)
+    assert "after termination" in refused(face, lambda: face.step(1, H))
+    assert "after termination" in refused(face, lambda: face.__setitem__("DM.Gas", 0.5))
+    assert "Terminate was called after termination" in refused(face, face.fmu.terminate)
     assert math.isfinite(face["Car.tz"])  # the last values stay readable
 
 
@@ -93,8 +77,8 @@ def test_a_step_past_the_stop_time_is_an_error(make: Make) -> None:
     face = make().initialise(stop=0.02)
     face.step(0, H)
     face.step(1, H)
-    assert "would pass the stop time 0.02" in error(face, lambda: face.step(2, H))
-    assert "would pass the stop time" in error(face, lambda: face.fmu.doStep(0.02, 1e-3))
+    assert "would pass the stop time 0.02" in refused(face, lambda: face.step(2, H))
+    assert "would pass the stop time" in refused(face, lambda: face.fmu.doStep(0.02, 1e-3))
     endless = make().initialise()
     endless.fmu.doStep(0.0, 2.0)
 

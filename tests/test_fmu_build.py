@@ -15,17 +15,6 @@ from fmpy.validation import validate_fmu
 from fmu_face import FIXTURE, ROOT, build, describe, generate, package, toolchain, variables
 
 
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
-    paths = build.build(FIXTURE, tmp_path_factory.mktemp("fmus"))
-    return dict(zip((2, 3), paths, strict=True))
-
-
-@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
-def version(request: pytest.FixtureRequest) -> int:
-    return request.param
-
-
 def run_build(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, str(ROOT / "fmu" / "build.py"), *arguments]
     environment = {**os.environ, **environment}

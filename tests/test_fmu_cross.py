@@ -11,33 +11,28 @@ sys.path.insert(0, str(ROOT / "fmu"))
 import cross
 
 
-@pytest.fixture(scope="module")
-def own(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    return build.build(FIXTURE, tmp_path_factory.mktemp("own"))
-
-
 def names(fmu: Path) -> set[str]:
     with zipfile.ZipFile(fmu) as archive:
         return set(archive.namelist())
 
 
-def test_binaries_of_all_platforms_come_together(own: list[Path], tmp_path: Path) -> None:
+def test_binaries_of_all_platforms_come_together(fmus: dict[int, Path], tmp_path: Path) -> None:
     """The same compiler stands in for the others: only the places count here."""
     windows = build.build(FIXTURE, tmp_path / "windows", target="x86_64-windows")
     arm = build.build(FIXTURE, tmp_path / "arm", target="aarch64-linux")
-    whole = cross.merge(own[1], [windows[1], arm[1]], tmp_path / "out")
-    assert names(whole) - names(own[1]) == {
+    whole = cross.merge(fmus[3], [windows[1], arm[1]], tmp_path / "out")
+    assert names(whole) - names(fmus[3]) == {
         "binaries/x86_64-windows/lag.dll",
         "binaries/aarch64-linux/lag.so",
     }
-    assert names(cross.merge(own[0], [windows[0]], tmp_path / "out")) - names(own[0]) == {
+    assert names(cross.merge(fmus[2], [windows[0]], tmp_path / "out")) - names(fmus[2]) == {
         "binaries/win64/lag.dll"
     }
 
 
-def test_the_own_binary_stays(own: list[Path], tmp_path: Path) -> None:
-    whole = cross.merge(own[1], own[1:], tmp_path)
-    assert whole.read_bytes() == own[1].read_bytes()
+def test_the_own_binary_stays(fmus: dict[int, Path], tmp_path: Path) -> None:
+    whole = cross.merge(fmus[3], [fmus[3]], tmp_path)
+    assert whole.read_bytes() == fmus[3].read_bytes()
 
 
 def test_the_smoke_test_runs_with_start_values() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import math
 from collections.abc import Callable, Iterator
@@ -12,7 +11,7 @@ from typing import Any
 
 import pytest
 import vehicle_fmus as fmus
-from fmu_face import Face
+from fmu_face import Face, instances
 from vehicle_rig import INPUTS, cosine_bump, output_names, straight_road
 
 Make = Callable[..., "Car"]
@@ -67,13 +66,7 @@ def folder(request: pytest.FixtureRequest) -> Iterator[Path]:
 
 @pytest.fixture
 def make(folder: Path, road: str) -> Iterator[Make]:
-    with contextlib.ExitStack() as stack:
-
-        def new() -> Car:
-            car = Car(folder, road)
-            stack.callback(car.free)
-            return car
-
+    with instances(Car, folder, road) as new:
         yield new
 
 

@@ -28,11 +28,6 @@ VEHICLE = ROOT / "cosim" / "fmus" / "vehicle.fmi3.fmu"
 needs_vehicle = pytest.mark.skipif(not VEHICLE.is_file(), reason="the vehicle FMUs are not built")
 
 
-@pytest.fixture(scope="module")
-def fmus(lag_fmus: dict[int, Path]) -> dict[int, Path]:
-    return lag_fmus
-
-
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
 def lag(fmus: dict[int, Path], request: pytest.FixtureRequest) -> Path:
     return fmus[request.param]

@@ -62,11 +62,6 @@ def changed(path: Path, version: int, *variables: Variable, without: Iterable[st
     return parrot(path, [v for v in kept.values() if v.name not in without], version)
 
 
-@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
-def version(request: pytest.FixtureRequest) -> int:
-    return int(request.param)
-
-
 # ---------------------------------------------------------------- what fits
 
 
