@@ -68,9 +68,11 @@ roads: $(VENV)/test.stamp ## surfaces, bumpy road and road scenarios: the tables
 	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/bumps.py
 	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/road_scenarios.py
 
-benchmarks: $(VENV)/test.stamp ## real-time factors and loop overhead, beside FMPy's simulate_fmu
+benchmarks: $(VENV)/test.stamp ## real-time factors, loop overhead beside FMPy's, the network, a batch, the vehicle's instructions (needs valgrind)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/bench_loop.py
 	$(BIN)/python tests/benchmarks/bench_sensor.py
+	$(BIN)/python tests/benchmarks/bench_batch.py
+	$(BIN)/python tests/benchmarks/bench_instructions.py
 
 clean:
 	rm -rf build dist results cosim/fmus $(VENV)/*.stamp

@@ -45,8 +45,12 @@ def dampers(rig: Rig) -> None:
     rig.inputs[DAMPERS] = 0.5 + 0.5 * np.sin(2.0 * np.pi * RATES * rig.t)
 
 
-def errors(road: str, kmh: float, seconds: float, command: Drive, step: float) -> Array:
-    """Rms of the error over rms of the truth, the four suspension velocities, shape (4,)."""
+def errors(
+    road: str, kmh: float, seconds: float, command: Drive, step: float, exact: float = REFERENCE
+) -> Array:
+    """Rms of the error over rms of the truth, the four suspension velocities, shape (4,); the truth
+    is the run at the step `exact` [s].
+    """
 
     def at(one: float) -> Array:
         start: dict[str, Value] = {
@@ -57,7 +61,7 @@ def errors(road: str, kmh: float, seconds: float, command: Drive, step: float) -
         record: Record = run(seconds, start, command)
         return record.corners("Car.C@.q0p")[LEAD:]
 
-    truth = at(REFERENCE)
+    truth = at(exact)
     off = at(step) - truth
     return np.asarray(np.sqrt((off**2).mean(axis=0) / (truth**2).mean(axis=0)))
 
@@ -117,3 +121,11 @@ def test_halving_the_step_quarters_the_error(roads: Roads) -> None:
     whole, half = (errors(roads("class C"), 50.0, 6.0, drive, s) for s in (DEFAULT, HALF))
     check = "class C at 50 km/h, driven: error over that at half the step [-]"
     gate("Solver", check, "4: second order", whole / half, at_least(3.0))
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize(("kmh", "most"), [(50.0, 0.01), (80.0, 0.011)])
+def test_halving_the_step_changes_little(roads: Roads, kmh: float, most: float) -> None:
+    changed = errors(roads("class C"), kmh, 4.0, dampers, DEFAULT, HALF)
+    check = f"class C at {kmh:g} km/h, straight on: change by halving the step, over rms [-]"
+    gate("Solver", check, "the default step halved", changed, at_most(most))

@@ -13,7 +13,6 @@
 
 #pragma GCC diagnostic ignored "-Wpsabi" /* Fours are passed to inlined functions only */
 
-
 #define INLINE static inline __attribute__((always_inline))
 
 typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
