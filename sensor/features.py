@@ -73,7 +73,8 @@ class WheelSpeedResiduals:
         driving[:, :2] /= np.cos(x[:, _STEER])
         driving *= self._axle + self._per_ax * x[:, [_AX]] + self._per_ay * x[:, [_AY]]
         left = x[:, WHEEL_SPEEDS] - driving
-        return np.clip(left, -self._limit, self._limit, out=left)
+        np.clip(left, -self._limit, self._limit, out=left)
+        return left
 
 
 def residuals(channels: npt.NDArray[np.floating[Any]]) -> Array:
