@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from sensor.channels import OUTPUT_NAMES
 from sensor.errors import SensorError
+from sensor.metrics.match import LEAST_TRUTH_RMS, rms
 
-LEAST_TRUTH_RMS = 0.010
-"""Truth rms [m/s] below which accuracy is flagged as meaningless."""
 SIGN_THRESHOLD = 0.020
 """Truth magnitude [m/s] above which the sign of the estimate is compared: it decides what a damper
 does.
@@ -30,8 +29,8 @@ class Figures:
     """Figures of one wheel or of all pooled, in m/s except where said.
 
     `nrmse` (ratio) and `accuracy` (percent) are None if the truth is exactly zero. `sign_agreement`
-    is the percentage of samples of right sign among those with |truth| > 20 mm/s, None if there is
-    none. The band holds the central 95 % of errors.
+    is the percentage of right signs among the `moving_samples` with |truth| > 20 mm/s, None if
+    there are none. The band holds the central 95 % of errors.
     """
 
     rmse: float
@@ -43,6 +42,7 @@ class Figures:
     error_low: float
     error_high: float
     sign_agreement: float | None
+    moving_samples: int
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,6 @@ class Metrics:
             name: asdict(figures) for name, figures in zip(OUTPUT_NAMES, self.wheels, strict=True)
         }
         return {"samples": self.samples, "wheels": wheels, "overall": asdict(self.overall)}
-
-
-def rms(values: Array) -> float:
-    """Root mean square of all elements, in their unit."""
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def rmse(estimate: Array, truth: Array) -> float:
@@ -125,4 +120,5 @@ def _figures(estimate: Array, truth: Array) -> Figures:
         error_low=float(low),
         error_high=float(high),
         sign_agreement=agreement,
+        moving_samples=int(np.count_nonzero(moving)),
     )
