@@ -42,6 +42,9 @@ from cosim.start import builtin_start, checked_parameters
 from cosim.vehicle import RECORDED, Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
 from sensor import OUTPUTS, SAMPLE_RATE_HZ, OnnxSensor, SensorError, default_model
+from sensor.channels import PASSIVE_COMMAND
+
+Array = npt.NDArray[np.float64]
 
 STEP_S: Final = 1 / SAMPLE_RATE_HZ
 SETTLING_S: Final = 2.0  # left out of the ride figures: the road's unevenness is still fading in
@@ -67,9 +70,12 @@ class RunResult:
 
 @dataclass
 class Assembly:
-    """The blocks of one run. `files` decide the result: fmu, network, road."""
+    """The blocks of one run. `files` decide the result: fmu, network, road; `initial_command` (4,)
+    is what the dampers hold before the first sample.
+    """
 
     recorder: Recorder
+    initial_command: Array
     files: Mapping[str, Path]
     blocks: Blocks
     vehicle: Vehicle
@@ -133,17 +139,18 @@ def assemble(
         sensor = _sensor(network)
     passive = isinstance(controller, Passive) and dampers is None
     start = _start_values(scenario, description, course, plan, passive)
-    initial = 0.0 if isinstance(controller, Passive) else controller.initial_command
+    block = dampers or _controller(scenario, controller)
     steps, if_late = _steps(scenario, plan)
     driver = plan.driver(STEP_S, friction_of(scenario))
     recorder = Recorder(record_groups(), steps + 1, STEP_S)
-    vehicle = Vehicle(description, wiring, start, STEP_S, initial)
+    vehicle = Vehicle(description, wiring, start, STEP_S, block.command)
     files = {"fmu": description.path, "network": network, "road": course.file}
     files |= {f"variant {name}": path for name, path in scenario.variants.files.items()}
     return Assembly(
         recorder=recorder,
+        initial_command=block.command.copy(),
         files={name: path for name, path in files.items() if path is not None},
-        blocks=Blocks(vehicle, driver, sensor, dampers or _controller(scenario, controller)),
+        blocks=Blocks(vehicle, driver, sensor, block),
         vehicle=vehicle,
         driver=driver,
         plan=plan,
@@ -245,7 +252,7 @@ def _sensor(network: Path) -> OnnxSensor:
 
 def _controller(scenario: Scenario, settings: Passive | SkyhookSettings) -> ControllerBlock:
     if isinstance(settings, Passive):
-        return FixedDampers()
+        return FixedDampers(PASSIVE_COMMAND)
     return Skyhook(
         settings.feedback == "truth",
         settings.gain_ns_per_m,
@@ -280,7 +287,7 @@ def _comfort(recorder: Recorder) -> dict[str, float]:
     return ride_figures(seat, travel, load, SAMPLE_RATE_HZ)
 
 
-def _recorded(recorder: Recorder, quantities: Sequence[Quantity]) -> npt.NDArray[np.float64]:
+def _recorded(recorder: Recorder, quantities: Sequence[Quantity]) -> Array:
     return recorder.columns([quantity.name for quantity in quantities])
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.controller import held
 from cosim.metrics import WHEELS
 from cosim.recorder import Recorder
 from sensor import FirFilter, SensorError, StillWheels, Zero, default_fir, evaluate
@@ -18,14 +19,15 @@ from sensor.paper import paper_rows
 Array = npt.NDArray[np.float64]
 
 
-def compare(recorder: Recorder) -> dict[str, Any]:
+def compare(recorder: Recorder, initial_command: Array) -> dict[str, Any]:
     """Return the figures of every estimator, per wheel and overall, and the rms of the truth.
 
-    `recorder` has the groups channels (rows, 14), estimate (rows, 4) [m/s], valid (rows, 1) and
-    truth (rows, 4) [m/s]. Only rows where the network is valid and every estimate exists count, the
-    same for all. Without such a row there are no figures but `valid_samples`, which is 0.
+    `recorder` has the groups channels (rows, 14), estimate (rows, 4) [m/s], valid (rows, 1), truth
+    (rows, 4) [m/s] and command (rows, 4), `initial_command` (4,) is the one before the first. Only
+    rows where the network is valid and every estimate exists count, the same for all. Without such
+    a row there are no figures but `valid_samples`, which is 0.
     """
-    truth, estimates, rows = estimates_of(recorder)
+    truth, estimates, rows = estimates_of(recorder, initial_command)
     figures: dict[str, Any] = {"valid_samples": int(rows.sum())}
     if not rows.any():
         return figures
@@ -35,13 +37,16 @@ def compare(recorder: Recorder) -> dict[str, Any]:
     return figures
 
 
-def estimates_of(recorder: Recorder) -> tuple[Array, dict[str, Array], npt.NDArray[np.bool_]]:
+def estimates_of(
+    recorder: Recorder, initial_command: Array
+) -> tuple[Array, dict[str, Array], npt.NDArray[np.bool_]]:
     """Return the truth and each estimator's velocities (rows, 4) [m/s], and the rows that count."""
     channels, truth = recorder.group("channels"), recorder.group("truth")
     estimates = {"network": recorder.group("estimate")}
     rows = recorder.group("valid")[:, 0] > 0
     if len(channels):
-        estimates |= {name: baseline.apply(channels) for name, baseline in _baselines().items()}
+        commands = held(recorder.group("command"), initial_command)
+        estimates |= {name: b.apply(channels, commands) for name, b in _baselines().items()}
     for estimate in estimates.values():
         rows = rows & np.isfinite(estimate).all(axis=1)
     return truth, estimates, rows

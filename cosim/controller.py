@@ -51,6 +51,13 @@ def damper_map(parameters: Mapping[str, object]) -> DamperMap:
     )
 
 
+def held(commands: Array, initial: Array) -> Array:
+    """Return the commands (rows, 4) that were held until each row: a record's `commands` (rows, 4),
+    each held from its row on, with `initial` (4,) before them.
+    """
+    return np.vstack([initial, commands])[: len(commands)]
+
+
 class FixedDampers:
     """Every damper at one command, whatever happens."""
 

@@ -49,12 +49,16 @@ class SensorBlock(Protocol):
 
     estimate: Array
 
-    def step(self, measured: Array) -> bool:
-        """Take the 14 channels, update `estimate` (4,) [m/s]; return whether it is valid."""
+    def step(self, measured: Array, command: Array) -> bool:
+        """Take the 14 channels and the damper command (4,) held until now, update `estimate` (4,)
+        [m/s]; return whether it is valid.
+        """
 
 
 class ControllerBlock(Protocol):
-    """Commands the dampers."""
+    """Commands the dampers; `command` (4,) is, before the first sample, the initial command."""
+
+    command: Array
 
     def step(self, measured: Array, estimate: Array, valid: bool, truth: Array) -> Array:
         """Return the damper commands (4,), 0 soft to 1 hard."""
@@ -83,10 +87,11 @@ def run(
     vehicle, driver, sensor, controller = (
         blocks.vehicle, blocks.driver, blocks.sensor, blocks.controller,
     )  # fmt: skip
+    command = controller.command  # the vehicle stands at t_0 with the initial one
     for k in range(steps + 1):
         state = vehicle.read()  # vehicle -> outputs at t_k
         vehicle.check_finite(k)
-        valid = sensor.step(state.channels)  # channels -> estimates, or invalid
+        valid = sensor.step(state.channels, command)  # channels -> estimates, or invalid
         command = controller.step(state.channels, sensor.estimate, valid, state.truth)
         pedals = driver.step(k, state)
         recorder.append(

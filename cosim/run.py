@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from cosim.errors import InputError, NetworkError
 from cosim.limits import Bounds, Verdict, evaluate, on_surface
@@ -20,6 +20,10 @@ from cosim.recorder import Recorder, require_parquet
 from cosim.scenario.controllers import Passive, Skyhook
 from cosim.scenario.paper_row import row_of
 from cosim.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 Progress = Callable[[str, int, int], None]
 
@@ -79,6 +83,10 @@ class Assembly(Protocol):
     @property
     def recorder(self) -> Recorder:
         """The record that the run fills."""
+
+    @property
+    def initial_command(self) -> npt.NDArray[np.float64]:
+        """Damper commands before the first sample, (4,)."""
 
     @property
     def files(self) -> Mapping[str, Path]:
@@ -220,7 +228,7 @@ def _run(
         "wall_time_s": result.wall_time_s,
         "largest_deviation_m": result.largest_deviation_m,
         "real_time_factor": result.simulated_s / max(result.wall_time_s, 1e-9),
-        **compare(assembly.recorder),
+        **compare(assembly.recorder, assembly.initial_command),
         "comfort": dict(result.comfort),
         "manoeuvre": dict(result.manoeuvre),
         "grip": dict(result.grip),

@@ -58,7 +58,7 @@ class Vehicle:
         wiring: Wiring,
         start_values: Mapping[str, Value],
         step_s: float,
-        initial_command: float = 0.0,
+        initial_command: Array | float = 0.0,
     ) -> None:
         self.step_s = step_s
         self._slave = Slave(

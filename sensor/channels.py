@@ -9,6 +9,7 @@ order front left, front right, rear left, rear right.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from sensor.errors import SensorError
 
@@ -102,6 +103,8 @@ CHANNELS: tuple[Channel, ...] = (
 OUTPUTS: tuple[Channel, ...] = tuple(
     _velocity(wheel, n) for n, wheel in enumerate(_WHEELS, start=1)
 )
+
+PASSIVE_COMMAND: Final = 0.3  # stands for the passive damper, whose curve lies at 0.27 to 0.34
 
 CHANNEL_NAMES: tuple[str, ...] = tuple(channel.name for channel in CHANNELS)
 CHANNEL_UNITS: tuple[str, ...] = tuple(channel.unit for channel in CHANNELS)

@@ -11,19 +11,26 @@ from numpy import float64
 class Estimator(Protocol):
     """An estimator that takes one sample at a time.
 
-    `estimate` (4,) [m/s], positive in extension, order FL FR RL RR, is the same array at every
-    step; NaN until valid.
+    `estimate` (4,) [m/s], positive in extension, order FL FR RL RR, and `deviation` (4,) [m/s], its
+    predicted standard deviation, are the same arrays at every step; NaN until valid. An estimator
+    that predicts no deviation leaves it NaN; one that does also has the method
+    `apply_with_deviation`, which returns the pair.
     """
 
     estimate: npt.NDArray[float64]
+    deviation: npt.NDArray[float64]
 
     def reset(self) -> None:
         """Forget all samples."""
 
-    def step(self, measured: npt.NDArray[float64]) -> bool:
-        """Take one sample (14,) in SI units, update `estimate`; return whether it is valid."""
+    def step(self, measured: npt.NDArray[float64], command: npt.NDArray[float64]) -> bool:
+        """Take one sample (14,) in SI units and the damper command (4,), 0 soft to 1 hard, that was
+        held over the interval which ends at it; update `estimate`; return whether it is valid.
+        """
 
-    def apply(self, channels: npt.NDArray[float64]) -> npt.NDArray[float64]:
-        """Estimate a whole run from a fresh start: (samples, 14) -> (samples, 4) [m/s], NaN until
-        valid.
+    def apply(
+        self, channels: npt.NDArray[float64], commands: npt.NDArray[float64]
+    ) -> npt.NDArray[float64]:
+        """Estimate a whole run from a fresh start, untouched by `step`: channels (samples, 14) and
+        commands (samples, 4), each held until its sample -> (samples, 4) [m/s], NaN until valid.
         """

@@ -48,14 +48,16 @@ class OnnxSensor:
         self._output = np.zeros((1, len(OUTPUTS)), dtype=np.float32)
         self._binding = self._bind()
         self.estimate = np.full(len(OUTPUTS), np.nan)
+        self.deviation = np.full(len(OUTPUTS), np.nan)
 
     def reset(self) -> None:
         """Forget all samples; the estimate is NaN until the window is full again."""
         self._window.reset()
         self.estimate.fill(np.nan)
 
-    def step(self, measured: npt.NDArray[np.float64]) -> bool:
-        """Take one sample (14,) in SI units, update `estimate`; return whether it is valid.
+    def step(self, measured: npt.NDArray[np.float64], command: npt.NDArray[np.float64]) -> bool:
+        """Take one sample (14,) in SI units, update `estimate`; return whether it is valid. The
+        network has no input for `command` (4,).
 
         Raises SensorError naming the channel if the sample holds a NaN or infinity; such a sample
         is not taken.
@@ -66,7 +68,9 @@ class OnnxSensor:
         self.estimate[:] = self._output[0]
         return True
 
-    def apply(self, channels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def apply(
+        self, channels: npt.NDArray[np.float64], commands: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]:
         """Estimate a whole run: (samples, 14) -> (samples, 4) [m/s], the first window - 1 rows NaN;
         `step`'s state is untouched.
         """

@@ -19,7 +19,7 @@ class Blind:
     def __init__(self) -> None:
         self.estimate: Array = np.full(4, np.nan)
 
-    def step(self, measured: Array) -> bool:
+    def step(self, measured: Array, command: Array) -> bool:
         return False
 
 
@@ -30,7 +30,7 @@ class Guess:
         self.estimate: Array = np.full(4, np.nan)
         self._missing = window
 
-    def step(self, measured: Array) -> bool:
+    def step(self, measured: Array, command: Array) -> bool:
         self._missing -= 1
         if self._missing > 0:
             return False

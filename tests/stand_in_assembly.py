@@ -54,6 +54,7 @@ class StandIn:
 
     def __post_init__(self) -> None:
         self.recorder = Recorder(GROUPS, self.rows)
+        self.initial_command = np.zeros(4)
 
     def run(self, progress: Callable[[int, int], None] | None) -> Result:
         for k in range(self.rows):

@@ -17,6 +17,7 @@ from cosim.errors import InputError, NetworkError
 from cosim.road import Smooth, build_road, load_track
 from cosim.scenario.load import load
 from sensor import SensorError
+from sensor.channels import PASSIVE_COMMAND
 
 SHORT = "0.05"
 
@@ -270,7 +271,9 @@ def test_passive_dampers_are_the_fmus_own_curve(tmp_path: Path) -> None:
     for dampers in (None, FixedDampers(0.0)):
         built = assemble(scenario, scenario.controllers[0], Blind(), dampers)
         built.run(None)
-        np.testing.assert_array_equal(built.recorder.group("command"), 0.0)
+        expected = PASSIVE_COMMAND if dampers is None else 0.0
+        np.testing.assert_array_equal(built.recorder.group("command"), expected)
+        np.testing.assert_array_equal(built.initial_command, expected)
         runs.append(np.std(built.recorder.group("truth")))
     assert runs[1] > 1.1 * runs[0]
 

@@ -32,7 +32,7 @@ from cosim.tables import (
 def figures():
     assembly = StandIn(rows=2000, gain=0.9)
     assembly.run(None)
-    return compare(assembly.recorder)
+    return compare(assembly.recorder, assembly.initial_command)
 
 
 def test_an_estimate_nine_tenths_of_the_truth_is_90_percent_accurate(figures):
@@ -55,8 +55,8 @@ def test_samples_before_the_first_valid_one_do_not_count(figures):
 def test_without_a_valid_sample_there_are_no_figures():
     recorder = Recorder(GROUPS, rows=1)
     recorder.append(0, np.zeros(14), np.full(4, np.nan), 0, np.zeros(4), np.zeros(4))
-    assert compare(recorder) == {"valid_samples": 0}
-    assert compare(Recorder(GROUPS, rows=1)) == {"valid_samples": 0}
+    assert compare(recorder, np.zeros(4)) == {"valid_samples": 0}
+    assert compare(Recorder(GROUPS, rows=1), np.zeros(4)) == {"valid_samples": 0}
     assert "Truth" in plain(estimate_table({"valid_samples": 0}))
 
 

@@ -16,7 +16,7 @@ from loop_rig import WINDOW, Blind, Guess, write_scenario
 
 from cosim.assembly import Assembly, assemble
 from cosim.cli import main
-from cosim.controller import SwitchingDampers
+from cosim.controller import SwitchingDampers, held
 from cosim.errors import FmuError
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.loop import run as run_loop
@@ -24,6 +24,7 @@ from cosim.recorder import Recorder, Signal
 from cosim.run import execute
 from cosim.scenario.load import load
 from cosim.vehicle import State
+from sensor.channels import PASSIVE_COMMAND
 
 Array = npt.NDArray[np.float64]
 
@@ -44,6 +45,7 @@ class Counter:
         self.last, self.fails_at = last, fails_at
         self.calls: list[str] = []
         self.held: list[tuple[float, float]] = []
+        self.told: list[float] = []
 
     def blocks(self) -> Blocks:
         return Blocks(_CountingVehicle(self), _CountingDriver(self), self._sensor(), self._damper())
@@ -54,7 +56,8 @@ class Counter:
         class Sensor:
             estimate = counter.estimate
 
-            def step(self, measured: Array) -> bool:
+            def step(self, measured: Array, command: Array) -> bool:
+                counter.told.append(float(command[0]))
                 counter.calls.append("sensor")
                 if measured[0] == counter.fails_at:
                     raise FmuError("stop")
@@ -67,6 +70,8 @@ class Counter:
         counter = self
 
         class Controller:
+            command = np.full(4, 199.0)
+
             def step(self, measured: Array, estimate: Array, valid: bool, truth: Array) -> Array:
                 counter.calls.append("controller")
                 assert estimate[0] == 100 + measured[0]
@@ -135,6 +140,14 @@ def test_commands_of_row_k_are_held_from_k_on() -> None:
     counter = Counter()
     run_loop(counter.blocks(), recorder(6), 5)
     assert counter.held == [(300.0 + k, 200.0 + k) for k in range(5)]
+
+
+def test_the_sensor_is_told_the_command_that_was_held_until_now() -> None:
+    counter, record = Counter(), recorder(6)
+    run_loop(counter.blocks(), record, 5)
+    assert counter.told == [199.0, *(200.0 + k for k in range(5))]
+    before = held(record.group("command"), np.full(4, 199.0))
+    np.testing.assert_array_equal(before[:, 0], counter.told)
 
 
 def test_the_vehicle_is_read_checked_and_stepped_once_a_sample() -> None:
@@ -368,7 +381,7 @@ def test_controllers_differ_only_from_when_they_may_act(closed_loop: Path) -> No
     }
     head = (results / "passive" / "signals.csv").read_text().splitlines()[0].split(",")
     rear = head.index("Car.SuspControl.DamperRL.CtrlOut")
-    assert (tables["passive"][:, rear] == 0).all()
+    assert (tables["passive"][:, rear] == PASSIVE_COMMAND).all()
     assert (tables["skyhook_estimate"][: WINDOW - 1, rear] == 0).all()
     for label in LABELS[1:]:
         command = tables[label][:, rear]

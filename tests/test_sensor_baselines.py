@@ -15,6 +15,7 @@ from sensor.recipe import FirRecipe
 
 Array = npt.NDArray[np.float64]
 WINDOW = 5
+COMMANDS = np.full((1000, 4), 0.3)
 TRUE_WEIGHTS = np.random.default_rng(7).normal(size=(WINDOW, 14, 4))
 TRUE_BIAS = np.array([0.1, -0.2, 0.3, 0.0])
 
@@ -24,7 +25,7 @@ def known_run(name: str, count: int, seed: int) -> Run:
     scale = np.logspace(-2, 1, 14)
     channels = np.random.default_rng(seed).normal(3.0 * scale, scale, (count, 14))
     channels = channels.astype(np.float32)
-    truth = FirFilter(TRUE_WEIGHTS, TRUE_BIAS).apply(channels)
+    truth = FirFilter(TRUE_WEIGHTS, TRUE_BIAS).apply(channels, COMMANDS[:count])
     truth[: WINDOW - 1] = 0.0
     return Run(name, channels, truth.astype(np.float32))
 
@@ -34,22 +35,25 @@ def test_fir_recovers_a_known_filter() -> None:
     fir = FirFilter.fit(runs, WINDOW, ridge=1e-12)
     np.testing.assert_allclose(fir.weights, TRUE_WEIGHTS, rtol=0.0, atol=1e-3)
     other = known_run("c", 500, 4)
-    assert evaluate(fir.apply(other.channels), other.truth.astype(float)).overall.rmse < 1e-5
+    assert (
+        evaluate(fir.apply(other.channels, COMMANDS[:500]), other.truth.astype(float)).overall.rmse
+        < 1e-5
+    )
 
 
 def test_fir_streaming_equals_batch() -> None:
     fir = FirFilter(TRUE_WEIGHTS, TRUE_BIAS)
     samples = known_run("a", 60, 1).channels.astype(np.float64)
-    expected = fir.apply(samples)
+    expected = fir.apply(samples, COMMANDS[:60])
     for _ in range(2):
         streamed = []
         for k, sample in enumerate(samples):
-            assert fir.step(sample) is (k >= WINDOW - 1)
+            assert fir.step(sample, COMMANDS[0]) is (k >= WINDOW - 1)
             streamed.append(fir.estimate.copy())
         np.testing.assert_allclose(streamed, expected, rtol=0.0, atol=1e-12)
         fir.reset()
         assert np.isnan(fir.estimate).all()
-    assert np.isnan(fir.apply(samples[:4])).all()
+    assert np.isnan(fir.apply(samples[:4], COMMANDS[:4])).all()
 
 
 def test_fir_file_round_trip_and_mismatch(tmp_path: Path) -> None:
@@ -94,20 +98,22 @@ def test_fit_command(tmp_path: Path) -> None:
 def test_zero_scores_nothing() -> None:
     zero = Zero()
     assert np.isnan(zero.estimate).all()
-    assert zero.step(np.zeros(14))
+    assert zero.step(np.zeros(14), COMMANDS[0])
     np.testing.assert_array_equal(zero.estimate, 0.0)
     truth = np.random.default_rng(0).normal(size=(50, 4))
-    assert evaluate(zero.apply(np.zeros((50, 14))), truth).overall.accuracy == pytest.approx(0.0)
+    assert evaluate(
+        zero.apply(np.zeros((50, 14)), COMMANDS[:50]), truth
+    ).overall.accuracy == pytest.approx(0.0)
 
 
 def test_still_wheels_is_the_body_motion() -> None:
     samples = np.random.default_rng(1).normal(size=(80, 14))
     baseline = StillWheels()
     for k, expected in enumerate(BodyMotion().apply(samples)):
-        assert baseline.step(samples[k])
+        assert baseline.step(samples[k], COMMANDS[k])
         np.testing.assert_allclose(baseline.estimate, expected, atol=1e-13)
     samples[0, 2] = np.nan
     with pytest.raises(SensorError, match=r"Car\.az is nan"):
-        baseline.step(samples[0])
+        baseline.step(samples[0], COMMANDS[0])
     baseline.reset()
     assert np.isnan(baseline.estimate).all()

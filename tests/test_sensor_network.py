@@ -18,6 +18,7 @@ from sensor.runtime import OnnxSensor
 
 Array = npt.NDArray[np.float64]
 SAMPLES: Array = np.random.default_rng(0).normal(size=(60, 14)) * np.logspace(-1, 1, 14) + 2.0
+COMMANDS = np.full((len(SAMPLES), 4), 0.3)
 
 
 def make_network(config: NetworkConfig | None = None) -> BiLstmNetwork:
@@ -59,18 +60,18 @@ def test_onnx_equals_torch(model: Path) -> None:
     windows = np.lib.stride_tricks.sliding_window_view(SAMPLES, 19, axis=0).transpose(0, 2, 1)
     with torch.no_grad():
         expected = network(torch.tensor(windows.copy(), dtype=torch.float32)).numpy()
-    estimates = onnx_sensor.apply(SAMPLES)
+    estimates = onnx_sensor.apply(SAMPLES, COMMANDS)
     np.testing.assert_allclose(estimates[18:], expected, rtol=0.0, atol=1e-5)
     assert np.isnan(estimates[:18]).all()
-    assert np.isnan(onnx_sensor.apply(SAMPLES[:18])).all()
+    assert np.isnan(onnx_sensor.apply(SAMPLES[:18], COMMANDS[:18])).all()
 
 
 def test_streaming_is_invalid_until_the_window_is_full_and_equals_batch(model: Path) -> None:
     onnx_sensor = OnnxSensor(model)
-    expected, estimate = onnx_sensor.apply(SAMPLES), onnx_sensor.estimate
+    expected, estimate = onnx_sensor.apply(SAMPLES, COMMANDS), onnx_sensor.estimate
     for _ in range(2):
         for k, sample in enumerate(SAMPLES):
-            assert onnx_sensor.step(sample) is (k >= 18)
+            assert onnx_sensor.step(sample, COMMANDS[0]) is (k >= 18)
             np.testing.assert_allclose(estimate, expected[k], rtol=0.0, atol=1e-6)
         onnx_sensor.reset()
         assert np.isnan(estimate).all()
@@ -79,16 +80,16 @@ def test_streaming_is_invalid_until_the_window_is_full_and_equals_batch(model: P
 
 def test_bad_samples_are_named_and_not_taken(model: Path) -> None:
     onnx_sensor = OnnxSensor(model)
-    expected = onnx_sensor.apply(SAMPLES)
+    expected = onnx_sensor.apply(SAMPLES, COMMANDS)
     for k, sample in enumerate(SAMPLES):
-        onnx_sensor.step(sample)
+        onnx_sensor.step(sample, COMMANDS[0])
         bad = sample.copy()
         bad[2], bad[13] = np.nan, np.inf
         with pytest.raises(SensorError, match=r"Car\.az is nan, Steer\.WhlAng is inf"):
-            onnx_sensor.step(bad)
+            onnx_sensor.step(bad, COMMANDS[0])
         np.testing.assert_allclose(onnx_sensor.estimate, expected[k], rtol=0.0, atol=1e-6)
     with pytest.raises(SensorError, match=r"\(13,\)"):
-        onnx_sensor.step(SAMPLES[0, :13])
+        onnx_sensor.step(SAMPLES[0, :13], COMMANDS[0])
 
 
 def edited(model: Path, path: Path, old: str, new: str) -> Path:

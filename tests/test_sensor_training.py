@@ -83,7 +83,7 @@ def test_train_writes_network_and_record(tmp_path: Path) -> None:
     channels = VALIDATION[0].channels
     with torch.no_grad():
         expected = network(torch.from_numpy(channels[:5])[None]).numpy()[0]
-    estimate = onnx_sensor.apply(channels.astype(np.float64))
+    estimate = onnx_sensor.apply(channels.astype(np.float64), np.full((len(channels), 4), 0.3))
     np.testing.assert_allclose(estimate[4], expected, rtol=0.0, atol=1e-5)
 
     figures = evaluate(estimate, VALIDATION[0].truth.astype(np.float64))

@@ -80,7 +80,7 @@ def drive(file: Path, surface: str) -> Row:
     scenario = load(file, [f"road.surface={surface}"])
     assembly = assemble(scenario, scenario.controllers[0])
     result = assembly.run(None)
-    truth, estimates, rows = estimates_of(assembly.recorder)
+    truth, estimates, rows = estimates_of(assembly.recorder, assembly.initial_command)
     metrics = {name: evaluate(estimates[name], truth, rows) for name in ESTIMATORS}
     speed = assembly.recorder.columns(["Car.vx"])[rows]
     projected = float(np.sqrt(np.mean(np.square(truth[rows] + speed * np.sin(THETA0)))))

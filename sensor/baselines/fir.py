@@ -96,6 +96,7 @@ class FirFilter:
         self._flat = np.ascontiguousarray(weights.reshape(-1, len(OUTPUTS)))
         self._buffer = Window(self.window, np.float64)
         self.estimate = np.full(len(OUTPUTS), np.nan)
+        self.deviation = np.full(len(OUTPUTS), np.nan)
 
     @classmethod
     def fit(cls, runs: Sequence[Run], window: int = 19, ridge: float = 1e-6) -> "FirFilter":
@@ -107,7 +108,7 @@ class FirFilter:
         self._buffer.reset()
         self.estimate.fill(np.nan)
 
-    def step(self, measured: Array) -> bool:
+    def step(self, measured: Array, command: Array) -> bool:
         """Take one sample (14,) in SI units, update `estimate`; return whether it is valid."""
         if not self._buffer.push(measured):
             return False
@@ -115,7 +116,9 @@ class FirFilter:
         self.estimate += self.bias
         return True
 
-    def apply(self, channels: npt.NDArray[np.floating[Any]]) -> Array:
+    def apply(
+        self, channels: npt.NDArray[np.floating[Any]], commands: npt.NDArray[np.floating[Any]]
+    ) -> Array:
         """Estimate a whole run: (samples, 14) -> (samples, 4) [m/s], the first W - 1 rows NaN."""
         result = np.full((len(channels), len(OUTPUTS)), np.nan)
         if len(channels) < self.window:

@@ -34,7 +34,9 @@ def fit_best(recipe: FirRecipe, training: Sequence[Run], validation: Sequence[Ru
 
 def _pooled_rmse(fir: FirFilter, runs: Sequence[Run]) -> float:
     first = fir.window - 1
-    estimates = np.concatenate([fir.apply(run.channels)[first:] for run in runs])
+    estimates = np.concatenate(
+        [fir.apply(run.channels, np.zeros((len(run.channels), 4)))[first:] for run in runs]
+    )
     return rmse(estimates, np.concatenate([run.truth[first:] for run in runs]).astype(np.float64))
 
 

@@ -20,13 +20,14 @@ class StillWheels:
         self._magnitude = np.zeros(len(CHANNELS))
         self._fits = np.zeros(len(CHANNELS), dtype=np.bool_)
         self.estimate = np.full(len(OUTPUTS), np.nan)
+        self.deviation = np.full(len(OUTPUTS), np.nan)
 
     def reset(self) -> None:
         """Forget all samples."""
         self._body.reset()
         self.estimate.fill(np.nan)
 
-    def step(self, measured: Array) -> bool:
+    def step(self, measured: Array, command: Array) -> bool:
         """Take one sample (14,) in SI units; raises SensorError naming a channel that is NaN or
         infinite.
         """
@@ -34,6 +35,6 @@ class StillWheels:
         self.estimate[:] = self._body.step(measured)
         return True
 
-    def apply(self, channels: Array) -> Array:
+    def apply(self, channels: Array, commands: Array) -> Array:
         """Estimate a whole run: (samples, 14) -> (samples, 4) [m/s]."""
         return self._body.apply(channels)

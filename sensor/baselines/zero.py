@@ -13,16 +13,17 @@ class Zero:
 
     def __init__(self) -> None:
         self.estimate = np.full(len(OUTPUTS), np.nan)
+        self.deviation = np.full(len(OUTPUTS), np.nan)
 
     def reset(self) -> None:
         """Forget all samples."""
         self.estimate.fill(np.nan)
 
-    def step(self, measured: Array) -> bool:
-        """Take one sample (14,)."""
+    def step(self, measured: Array, command: Array) -> bool:
+        """Take one sample (14,) and the damper command (4,)."""
         self.estimate.fill(0.0)
         return True
 
-    def apply(self, channels: Array) -> Array:
+    def apply(self, channels: Array, commands: Array) -> Array:
         """Return zeros (samples, 4) for a run (samples, 14)."""
         return np.zeros((len(channels), len(OUTPUTS)))

@@ -66,6 +66,7 @@ def main() -> None:
     torch.set_num_threads(1)
     network = BiLstmNetwork().eval()
     samples = np.random.default_rng(0).normal(size=(SAMPLES, 14))
+    command = np.full(4, 0.3)
     options = ort.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3
@@ -82,7 +83,7 @@ def main() -> None:
         onnx_sensor = OnnxSensor(model)
     with torch.inference_mode():
         forms: dict[str, Callable[[int], object]] = {
-            "run time (one backward step)": lambda k: onnx_sensor.step(samples[k]),
+            "run time (one backward step)": lambda k: onnx_sensor.step(samples[k], command),
             "ONNX, full backward direction": lambda _: full.run(None, {"measured": window}),
             "torch, one backward step": lambda _: network(tensor),
         }
