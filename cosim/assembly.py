@@ -28,6 +28,7 @@ from cosim.quantities import (
     DAMPERS,
     DRIVER,
     GRIP_SHARE,
+    RECORDED,
     SEAT,
     TRAVEL,
     TRUTH,
@@ -39,10 +40,11 @@ from cosim.scenario.controllers import Passive
 from cosim.scenario.controllers import Skyhook as SkyhookSettings
 from cosim.scenario.schema import Scenario
 from cosim.start import builtin_start, checked_parameters
-from cosim.vehicle import RECORDED, Vehicle, builtin_fmu
+from cosim.vehicle import Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
 from sensor import OUTPUTS, SAMPLE_RATE_HZ, OnnxSensor, SensorError, default_model
 from sensor.channels import PASSIVE_COMMAND
+from sensor.conditions import PRODUCTION_PARAMETERS
 
 Array = npt.NDArray[np.float64]
 
@@ -231,6 +233,7 @@ def _start_values(
     """Return the start values; of ours, another FMU gets those that it has by the same names."""
     speed = float(plan.speed[int(np.searchsorted(plan.line.s, 0.0))])
     own = builtin_start(course, plan.line, speed, passive, scenario.road.friction)
+    own = {**PRODUCTION_PARAMETERS, **own}
     known = {name: value for name, value in own.items() if name in description.variables}
     return known | scenario.parameters
 

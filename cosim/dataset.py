@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cosim.errors import InputError
 from cosim.scenario.surface import SurfaceName
+from sensor.channels import ROAD, STAGE
+
+if TYPE_CHECKING:
+    from cosim.recorder import Recorder
+    from sensor.dataset import Run
 
 Array = npt.NDArray[np.float64]
 Dampers = Literal["passive", "switching"]
@@ -158,7 +163,7 @@ def drive(planned: PlannedRun, directory: Path) -> str:
     from cosim.controller import SwitchingDampers
     from cosim.scenario.controllers import Passive
     from cosim.scenario.load import load
-    from sensor.dataset import Run, write_run
+    from sensor.dataset import write_run
 
     scenario = load(planned.scenario, planned.overrides)
     switching = planned.dampers == "switching"
@@ -167,17 +172,31 @@ def drive(planned: PlannedRun, directory: Path) -> str:
     result = assembly.run(None)
     if result.lap_time_s is None:
         raise InputError(f"{planned.scenario}: the lap was not finished, so it is no training run")
-    record = assembly.recorder
-    run = Run(
-        planned.stem,
-        record.group("channels").astype(np.float32),
-        record.group("truth").astype(np.float32),
-        _recipe(planned),
-    )
+    run = run_of(assembly.recorder, assembly.initial_command, planned.stem, _recipe(planned))
     part = directory / f".{planned.stem}.part"
     write_run(part, run)
     part.replace(directory / f"{planned.stem}.parquet")
     return planned.stem
+
+
+def run_of(recorder: Recorder, initial: Array, name: str, recipe: Mapping[str, Any]) -> Run:
+    """Return what was recorded as a run of a data set.
+
+    A command of the record is held behind its sample, one of the run before it; the first sample
+    has the `initial` command (4,).
+    """
+    from cosim.controller import held
+    from sensor.dataset import Run
+
+    recorded = {
+        "channels": recorder.group("channels"),
+        "stage": recorder.columns([channel.name for channel in STAGE]),
+        "commands": held(recorder.group("command"), initial),
+        "truth": recorder.group("truth"),
+        "road": recorder.columns([channel.name for channel in ROAD]),
+    }
+    parts = {group: values.astype(np.float32) for group, values in recorded.items()}
+    return Run(name=name, recipe=recipe, **parts)
 
 
 class NoSensor:

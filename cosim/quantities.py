@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from sensor.channels import CHANNELS, OUTPUTS
+from sensor.channels import CHANNELS, COMMANDS, OUTPUTS, ROAD, STAGE
 
 CORNERS: Final = ("FL", "FR", "RL", "RR")
 
@@ -61,16 +61,20 @@ GRIP_SHARE: Final = tuple(
 )
 RIDE: Final = (*SEAT, *TRAVEL, *TYRE_LOAD, *GRIP_SHARE)
 
+SENSOR_STAGE: Final = tuple(_own(c.name, c.unit, c.description, False) for c in STAGE)
+ROAD_HEIGHT: Final = tuple(_own(c.name, c.unit, c.description, False) for c in ROAD)
+RECORDED: Final = (*POSE, *RIDE, *SENSOR_STAGE, *ROAD_HEIGHT)
+
 STEER: Final = _own("DM.Steer.Ang", "rad", "steering-wheel angle, positive to the left")
 GAS: Final = _own("DM.Gas", "1", "accelerator pedal, 0 to 1")
 BRAKE: Final = _own("DM.Brake", "1", "brake pedal, 0 to 1")
 DRIVER: Final = (STEER, GAS, BRAKE)
 
 DAMPERS: Final = tuple(
-    _own(f"Car.SuspControl.Damper{c}.CtrlOut", "1", f"damper command {c}, 0 soft, 1 hard", False)
-    for c in CORNERS
+    _own(c.name, c.unit, f"damper command {corner}, 0 soft, 1 hard", False)
+    for c, corner in zip(COMMANDS, CORNERS, strict=True)
 )
 
-OUTPUT_QUANTITIES: Final = (*CHANNEL_QUANTITIES, *TRUTH, *POSE, *RIDE)
+OUTPUT_QUANTITIES: Final = (*CHANNEL_QUANTITIES, *TRUTH, *RECORDED)
 INPUT_QUANTITIES: Final = (*DRIVER, *DAMPERS)
 QUANTITIES: Final = {q.name: q for q in (*OUTPUT_QUANTITIES, *INPUT_QUANTITIES)}

@@ -7,19 +7,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import FmuError
 from cosim.fmi import Description, Slave, Value
-from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, POSE, RIDE, TRUTH, Quantity
+from cosim.quantities import (
+    CHANNEL_QUANTITIES,
+    DAMPERS,
+    DRIVER,
+    POSE,
+    RECORDED,
+    SENSOR_STAGE,
+    TRUTH,
+    Quantity,
+)
 from cosim.wiring import Wire, Wiring
 
 Array = npt.NDArray[np.float64]
-
-RECORDED: Final = (*POSE, *RIDE)
 
 
 def builtin_fmu(fmi_version: int = 3) -> Path:
@@ -35,13 +41,15 @@ class State:
     """The vehicle's outputs at t_k in SI units; views of one buffer that `Vehicle.read` refills.
 
     channels (14,), truth (4,) [m/s, positive in extension], pose (3,) [m, m, rad],
-    recorded (pose and ride quantities, in the order of `RECORDED`; NaN where the FMU has none).
+    recorded (all beside channels and truth, in the order of `RECORDED`), stage (11,) what
+    production sensors deliver (`sensor.STAGE`); NaN where the FMU has none.
     """
 
     channels: Array
     truth: Array
     pose: Array
     recorded: Array
+    stage: Array
 
 
 class Vehicle:
@@ -68,8 +76,14 @@ class Vehicle:
         self._prepare_outputs(wiring.outputs)
         self._prepare_inputs(wiring.inputs)
         n, m = len(CHANNEL_QUANTITIES), len(CHANNEL_QUANTITIES) + len(TRUTH)
+        recorded = self._values[m:]
+        stage = RECORDED.index(SENSOR_STAGE[0])
         self._state = State(
-            self._values[:n], self._values[n:m], self._values[m : m + len(POSE)], self._values[m:]
+            channels=self._values[:n],
+            truth=self._values[n:m],
+            pose=recorded[: len(POSE)],
+            recorded=recorded,
+            stage=recorded[stage : stage + len(SENSOR_STAGE)],
         )
         self._commands[len(DRIVER) :] = initial_command
         self._hold()

@@ -1,15 +1,21 @@
-"""The sensor's fourteen inputs and four outputs: names, units, signs. Nothing else in the project
-repeats them.
+"""The sensor's fourteen inputs and four outputs, and the signals beside them: names, units, signs.
+Nothing else in the project repeats them.
 
 The order is that of Table 2 of the paper. Names are the variable names of the vehicle FMU. Units
 are SI throughout; where the paper's table has degrees, `paper_unit` says so and the network's own
 normalisation makes up the difference. Axes are ISO 8855: x forward, y left, z up; wheels in the
 order front left, front right, rear left, rear right.
+
+Beside the paper's signals stand the damper commands (`COMMANDS`), what production sensors deliver
+in place of the ideal channels (`STAGE`), and the road's height below the wheels (`ROAD`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
+
+import numpy as np
+import numpy.typing as npt
 
 from sensor.errors import SensorError
 
@@ -19,16 +25,16 @@ SAMPLE_RATE_HZ = 100
 @dataclass(frozen=True)
 class Channel:
     """One signal: its name in the vehicle FMU, its SI unit, what is positive, and its line in the
-    paper's Table 2.
+    paper's Table 2 (number 0 where it has none).
     """
 
     name: str
     unit: str
     description: str
     sign: str
-    paper_number: int
-    paper_name: str
-    paper_unit: str
+    paper_number: int = 0
+    paper_name: str = ""
+    paper_unit: str = ""
 
 
 _WHEELS = {"FL": "front left", "FR": "front right", "RL": "rear left", "RR": "rear right"}
@@ -104,12 +110,60 @@ OUTPUTS: tuple[Channel, ...] = tuple(
     _velocity(wheel, n) for n, wheel in enumerate(_WHEELS, start=1)
 )
 
+# Held over the interval that ends at the sample; the first row has the initial command.
+COMMANDS: tuple[Channel, ...] = tuple(
+    Channel(
+        f"Car.SuspControl.Damper{wheel}.CtrlOut",
+        "1",
+        f"command of the {place} damper, held over the interval that ends at the sample",
+        "0 soft, 1 hard",
+    )
+    for wheel, place in _WHEELS.items()
+)
 PASSIVE_COMMAND: Final = 0.3  # stands for the passive damper, whose curve lies at 0.27 to 0.34
+
+
+def _staged(channel: Channel, name: str) -> Channel:
+    """Return the channel as a production sensor delivers it."""
+    description = f"production sensor, before noise: {channel.description}"
+    return replace(
+        channel, name=name, description=description, paper_number=0, paper_name="", paper_unit=""
+    )
+
+
+def _stage() -> tuple[Channel, ...]:
+    renamed = {"Car.vx": "Sensor.Esc.vx"}
+    renamed |= {f"Car.v{wheel}": f"Sensor.v{wheel}" for wheel in _WHEELS}
+    moved = ("Car.ax", "Car.ay", "Car.az", "Car.RollVel", "Car.PitchVel", "Car.YawRate")
+    renamed |= {name: name.replace("Car.", "Sensor.Imu.") for name in moved}
+    return tuple(_staged(c, renamed[c.name]) for c in CHANNELS if c.name in renamed)
+
+
+STAGE: tuple[Channel, ...] = _stage()
+
+ROAD: tuple[Channel, ...] = tuple(
+    Channel(f"Car.zRoad{wheel}", "m", f"road height below the {place} wheel", "positive upward")
+    for wheel, place in _WHEELS.items()
+)
 
 CHANNEL_NAMES: tuple[str, ...] = tuple(channel.name for channel in CHANNELS)
 CHANNEL_UNITS: tuple[str, ...] = tuple(channel.unit for channel in CHANNELS)
 OUTPUT_NAMES: tuple[str, ...] = tuple(channel.name for channel in OUTPUTS)
 OUTPUT_UNITS: tuple[str, ...] = tuple(channel.unit for channel in OUTPUTS)
+
+# Where the stage's signals stand among the channels; the three steering angles stay as they are.
+STAGED: Final = tuple(i for i, c in enumerate(CHANNELS) if "Steer" not in c.name)
+
+
+def stage_channels(
+    channels: npt.NDArray[np.floating], stage: npt.NDArray[np.floating]
+) -> npt.NDArray[np.floating]:
+    """Return the 14 channels with the production sensors' signals in their places: (n, 14) and
+    (n, 11) -> (n, 14), or one sample (14,) and (11,) -> (14,), in the order of `CHANNELS`.
+    """
+    staged = np.array(channels)
+    staged[..., list(STAGED)] = stage
+    return staged
 
 
 def differences(

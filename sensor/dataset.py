@@ -1,8 +1,9 @@
 """Runs on disk, and windows of them in memory.
 
-A data set is a directory of Parquet files, one per run: a column for each of the 14 channels and
-each `VRel.*` truth, its unit in the field's metadata under `unit`, and the run's recipe as JSON in
-the schema's metadata under `recipe`.
+A data set is a directory of Parquet files, one per run: a column for each signal of `SIGNALS` (the
+14 channels, the production sensors' 11, the damper commands, the `VRel.*` truth, the road below the
+wheels), its unit in the field's metadata under `unit`, and the run's recipe as JSON in the schema's
+metadata under `recipe`.
 
 In memory all runs lie end to end in one float32 array; a window is only the index of its last
 sample, so 19-fold overlap costs nothing. A window never reaches back over the start of its run.
@@ -12,26 +13,41 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from sensor.channels import CHANNEL_NAMES, CHANNELS, OUTPUT_NAMES, OUTPUTS
+from sensor.channels import CHANNEL_NAMES, CHANNELS, COMMANDS, OUTPUT_NAMES, OUTPUTS, ROAD, STAGE
 from sensor.errors import SensorError
 
 Float32 = npt.NDArray[np.float32]
 
 
+# The signals of a run, field by field
+SIGNALS: Final = {
+    "channels": CHANNELS,
+    "stage": STAGE,
+    "commands": COMMANDS,
+    "truth": OUTPUTS,
+    "road": ROAD,
+}
+
+
 @dataclass(frozen=True)
 class Run:
-    """One run: `channels` (samples, 14) and `truth` (samples, 4), SI units, and the recipe that
-    made it.
+    """One run: `channels` (samples, 14), `stage` (samples, 11), what production sensors deliver
+    before noise, damper `commands` (samples, 4), each held over the interval that ends at its
+    sample, `truth` (samples, 4) and the `road` (samples, 4) below the wheels, all in SI units; and
+    the recipe that made it.
     """
 
     name: str
     channels: Float32
+    stage: Float32
+    commands: Float32
     truth: Float32
+    road: Float32
     recipe: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -41,9 +57,10 @@ def write_run(path: str | Path, run: Run) -> None:
     import pyarrow.parquet as pq
 
     fields, columns = [], []
-    for group, values in ((CHANNELS, run.channels), (OUTPUTS, run.truth)):
-        for i, channel in enumerate(group):
-            fields.append(pa.field(channel.name, pa.float32(), metadata={"unit": channel.unit}))
+    for group, signals in SIGNALS.items():
+        values = getattr(run, group)
+        for i, signal in enumerate(signals):
+            fields.append(pa.field(signal.name, pa.float32(), metadata={"unit": signal.unit}))
             columns.append(pa.array(np.ascontiguousarray(values[:, i], dtype=np.float32)))
     recipe = json.dumps(dict(run.recipe), sort_keys=True)
     pq.write_table(pa.table(columns, pa.schema(fields, metadata={"recipe": recipe})), path)
@@ -57,7 +74,7 @@ def read_run(path: str | Path) -> Run:
     import pyarrow.parquet as pq
 
     path = Path(path)
-    expected = (*CHANNELS, *OUTPUTS)
+    expected = [signal for signals in SIGNALS.values() for signal in signals]
     try:
         schema = pq.read_schema(path)
     except (OSError, pa.ArrowInvalid) as error:
@@ -82,7 +99,9 @@ def read_run(path: str | Path) -> Run:
     if bad:
         raise SensorError(f"{path}: column {', '.join(bad)} holds a NaN or an infinity.")
     recipe = json.loads((schema.metadata or {}).get(b"recipe", b"{}"))
-    return Run(path.stem, values[:, : len(CHANNELS)], values[:, len(CHANNELS) :], recipe)
+    ends = np.cumsum([len(signals) for signals in SIGNALS.values()])
+    parts = dict(zip(SIGNALS, np.split(values, ends[:-1], axis=1), strict=True))
+    return Run(name=path.stem, recipe=recipe, **parts)
 
 
 def select_files(directory: str | Path, patterns: Sequence[str]) -> list[Path]:

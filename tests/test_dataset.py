@@ -25,7 +25,10 @@ from cosim.dataset import (
     plan,
 )  # fmt: skip
 from cosim.errors import InputError
+from cosim.quantities import CORNERS
 from cosim.scenario.load import load
+from sensor.channels import CHANNELS, PASSIVE_COMMAND
+from sensor.conditions import PRODUCTION_PARAMETERS
 from sensor.dataset import Run, read_run
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -180,11 +183,37 @@ def test_a_run_is_what_the_loop_records(tmp_path: Path) -> None:
     assert result.lap_time_s is not None
     for values, group in ((run.channels, "channels"), (run.truth, "truth")):
         np.testing.assert_array_equal(values, again.recorder.group(group).astype(np.float32))
+    assert (run.commands == np.float32(PASSIVE_COMMAND)).all()
+    heights = again.recorder.columns([f"Car.zRoad{c}" for c in CORNERS])
+    np.testing.assert_array_equal(run.road, heights.astype(np.float32))
+    assert 1e-4 < np.abs(run.road).max() < 0.1
     assert (
         run.recipe.items() >= {"scenario": "a_short.yaml", "dampers": "passive", "seed": 5}.items()
     )
     assert run.name == "a_short_passive"
     assert [path.name for path in (tmp_path / "data").iterdir()] == ["a_short_passive.parquet"]
+
+
+def test_production_sensors_are_recorded_as_they_are_mounted(tmp_path: Path) -> None:
+    """Turned, moved and slowed, but the same motion; without the settings it is that of the car."""
+    run = recorded(PlannedRun(short(tmp_path), "passive", 5), tmp_path / "data")
+    ideal = run.channels[:, [i for i, c in enumerate(CHANNELS) if "Steer" not in c.name]]
+    assert run.stage.shape == ideal.shape
+    assert not (run.stage == ideal).all(axis=0).any()
+    np.testing.assert_allclose(run.stage[20:, 6:], ideal[20:, 6:], atol=0.1)  # speeds
+    pitched = PRODUCTION_PARAMETERS["Sensor.Imu.Pitch"] * 9.81
+    assert np.mean(run.stage[:, 0] - ideal[:, 0]) == pytest.approx(-pitched, abs=0.03)
+
+
+def test_a_command_of_a_run_is_the_one_that_led_to_its_sample(tmp_path: Path) -> None:
+    path = short(tmp_path)
+    run = recorded(PlannedRun(path, "switching", 5), tmp_path / "data")
+    scenario = load(path, ["seed=5"])
+    again = assemble(scenario, scenario.controllers[0], NoSensor(), SwitchingDampers(5, 0.01))
+    again.run(None)
+    given = again.recorder.group("command").astype(np.float32)
+    np.testing.assert_array_equal(run.commands[1:], given[:-1])
+    np.testing.assert_array_equal(run.commands[0], 0.0)
 
 
 def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:

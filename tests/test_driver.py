@@ -164,7 +164,7 @@ def test_travel_time_of_a_constant_speed_and_of_a_stop() -> None:
 def state(x: float, y: float, yaw: float, speed: float) -> State:
     channels = np.zeros(14)
     channels[6] = speed
-    return State(channels, np.zeros(4), np.array([x, y, yaw]), np.zeros(14))
+    return State(channels, np.zeros(4), np.array([x, y, yaw]), np.zeros(14), np.zeros(11))
 
 
 def first_command(track: Track, x: float, y: float, yaw: float, speed: float) -> list[float]:

@@ -89,7 +89,9 @@ class _CountingVehicle:
     def read(self) -> State:
         self.counter.calls.append("read")
         k = self.now
-        return State(np.full(14, k), np.full(4, -k), np.full(3, k), np.full(14, 10 * k))
+        return State(
+            np.full(14, k), np.full(4, -k), np.full(3, k), np.full(14, 10 * k), np.full(11, k)
+        )
 
     def check_finite(self, k: int) -> None:
         self.counter.calls.append("check")

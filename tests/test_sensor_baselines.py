@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
+from sensor_run import run_of
 
 from sensor.baselines import FirFilter, StillWheels, Zero
 from sensor.baselines.fit import fit_best, main
@@ -27,7 +28,7 @@ def known_run(name: str, count: int, seed: int) -> Run:
     channels = channels.astype(np.float32)
     truth = FirFilter(TRUE_WEIGHTS, TRUE_BIAS).apply(channels, COMMANDS[:count])
     truth[: WINDOW - 1] = 0.0
-    return Run(name, channels, truth.astype(np.float32))
+    return run_of(name, channels, truth)
 
 
 def test_fir_recovers_a_known_filter() -> None:

@@ -1,10 +1,23 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import sensor
-from sensor.channels import CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, OUTPUTS, check_channels
+from cosim.fmi import Description
+from cosim.vehicle import builtin_fmu
+from sensor.channels import (
+    CHANNEL_NAMES,
+    CHANNEL_UNITS,
+    CHANNELS,
+    COMMANDS,
+    OUTPUTS,
+    ROAD,
+    STAGE,
+    check_channels,
+    stage_channels,
+)
 from sensor.errors import SensorError
 from sensor.paper import PRINTED_MEAN_ACCURACY, paper_rows, search_rows
 
@@ -15,6 +28,29 @@ def test_channels_follow_table_2() -> None:
     assert len(set(CHANNEL_NAMES)) == 14
     degrees = [channel.name for channel in CHANNELS if "deg" in channel.paper_unit]
     assert degrees == [channel.name for channel in CHANNELS if "rad" in channel.unit]
+
+
+def test_the_vehicle_has_every_signal_under_its_name_and_unit() -> None:
+    description = Description(builtin_fmu())
+    for signal in (*CHANNELS, *STAGE, *COMMANDS, *ROAD):
+        unit = description.unit_of(signal.name)
+        assert (unit or "1") == signal.unit, signal.name
+
+
+def test_production_sensors_stand_in_the_places_of_the_ideal_channels() -> None:
+    """By name: the mount's accelerations and rates, the ESC's speed, the teeth's wheel speeds."""
+    assert len(STAGE) == 11
+    channels = np.arange(28.0).reshape(2, 14)
+    stage = 100.0 + np.arange(22.0).reshape(2, 11)
+    staged = stage_channels(channels, stage)
+    kept = ("Car.SteerAngleFL", "Car.SteerAngleFR", "Steer.WhlAng")
+    last = [signal.name.rsplit(".", 1)[1] for signal in STAGE]
+    for i, name in enumerate(CHANNEL_NAMES):
+        there = name in kept
+        expected = channels[:, i] if there else stage[:, last.index(name.rsplit(".", 1)[1])]
+        np.testing.assert_array_equal(staged[:, i], expected)
+    np.testing.assert_array_equal(stage_channels(channels[1], stage[1]), staged[1])
+    np.testing.assert_array_equal(channels, np.arange(28.0).reshape(2, 14))
 
 
 def test_every_difference_is_named() -> None:

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from sensor.channels import CHANNEL_NAMES
-from sensor.dataset import Normalisation, Run, WindowSet, read_run, read_runs, write_run
+from sensor.dataset import (
+    SIGNALS,
+    Normalisation,
+    Run,
+    WindowSet,
+    read_run,
+    read_runs,
+    write_run,
+)
 from sensor.errors import SensorError
 
 PLAIN = Normalisation(
@@ -18,15 +27,16 @@ PLAIN = Normalisation(
 def numbered(name: str, first: int, count: int) -> Run:
     """A run whose every sample carries its own number."""
     numbers = np.arange(first, first + count, dtype=np.float32)[:, np.newaxis]
-    return Run(name, np.tile(numbers, (1, 14)), np.tile(numbers, (1, 4)), {"style": name})
+    groups = {group: np.tile(numbers, (1, len(signals))) for group, signals in SIGNALS.items()}
+    return Run(name, **groups, recipe={"style": name})
 
 
 def test_written_run_is_read_back(tmp_path: Path) -> None:
     write_run(tmp_path / "a.parquet", numbered("a", 0, 30))
     write_run(tmp_path / "again.parquet", numbered("a", 0, 30))
     run = read_run(tmp_path / "a.parquet")
-    np.testing.assert_array_equal(run.channels, numbered("a", 0, 30).channels)
-    np.testing.assert_array_equal(run.truth, numbered("a", 0, 30).truth)
+    for group in SIGNALS:
+        np.testing.assert_array_equal(getattr(run, group), getattr(numbered("a", 0, 30), group))
     assert (run.name, run.recipe) == ("a", {"style": "a"})
     assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "again.parquet").read_bytes()
 
@@ -96,7 +106,9 @@ def test_normalisation_is_that_of_all_samples_together() -> None:
     ]
     for part in parts:
         part[:, 3] = 7.0
-    norm = Normalisation.of([Run("r", part, part[:, :4]) for part in parts])
+    norm = Normalisation.of(
+        [replace(numbered("r", 0, 1), channels=p, truth=p[:, :4]) for p in parts]
+    )
     pooled = np.concatenate(parts).astype(np.float64)
     np.testing.assert_allclose(norm.input_mean, pooled.mean(axis=0), rtol=1e-6)
     assert norm.input_std[3] == 1.0

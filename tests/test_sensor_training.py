@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
+from sensor_run import run_of
 
 from sensor import train as train_module
 from sensor.dataset import Run, write_run
@@ -25,7 +26,7 @@ def linear_run(name: str, seed: int) -> Run:
     mixed = channels[:, :4] / np.logspace(-1, 1, 14)[:4]
     truth = 0.1 * np.stack([np.convolve(c, kernel)[:600] for c in mixed.T], axis=1)
     truth += rng.normal(scale=0.002, size=truth.shape)
-    return Run(name, channels.astype(np.float32), truth.astype(np.float32))
+    return run_of(name, channels, truth)
 
 
 def make_recipe(**training: Any) -> Recipe:

@@ -13,8 +13,15 @@ from foreign_fmu import ECHO, Map, Variable, own_variables, parrot, report
 
 from cosim.errors import FmuError
 from cosim.fmi import Description, Value
-from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, OUTPUT_QUANTITIES, POSE, TRUTH
-from cosim.vehicle import RECORDED, Vehicle, builtin_fmu
+from cosim.quantities import (
+    CHANNEL_QUANTITIES,
+    DAMPERS,
+    OUTPUT_QUANTITIES,
+    POSE,
+    RECORDED,
+    TRUTH,
+)
+from cosim.vehicle import Vehicle, builtin_fmu
 from cosim.wiring import mapped_wiring, own_wiring
 
 Array = npt.NDArray[np.float64]
