@@ -191,7 +191,7 @@ class Measurement:
         """
         if self._ideal:
             return np.array(channels, dtype=np.float64)
-        staged = stage_channels(channels.astype(np.float64), stage)
+        staged = np.asarray(stage_channels(channels, stage), dtype=np.float64)
         now = np.arange(len(staged))[:, np.newaxis]
         measured = np.take_along_axis(staged, np.maximum(now - self._latency, 0), axis=0)
         measured *= self.gain

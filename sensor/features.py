@@ -72,7 +72,7 @@ class WheelSpeedResiduals:
         driving = x[:, [_VX]] - x[:, [_YAW]] * self._y
         driving[:, :2] /= np.cos(x[:, _STEER])
         driving *= self._axle + self._per_ax * x[:, [_AX]] + self._per_ay * x[:, [_AY]]
-        left = x[:, WHEEL_SPEEDS] - driving
+        left: Array = x[:, WHEEL_SPEEDS] - driving
         np.clip(left, -self._limit, self._limit, out=left)
         return left
 

@@ -50,6 +50,7 @@ class FirRecipe(_Part):
     """
 
     window: int = Field(default=19, ge=1)
+    channels: Literal["raw", "residual"] = "raw"
     ridges: tuple[float, ...] = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 
 

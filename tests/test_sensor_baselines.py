@@ -6,11 +6,15 @@ import pytest
 from click.testing import CliRunner
 from sensor_run import run_of
 
+from sensor.ablation import GROUPS, ablation
 from sensor.baselines import FirFilter, StillWheels, Zero
-from sensor.baselines.fit import fit_best, main
+from sensor.baselines.fit import FILTERS, equations, fit_best, main
+from sensor.baselines.normal_equations import Features, NormalEquations, Samples, Standard
 from sensor.body_motion import BodyMotion
+from sensor.conditions import CONDITIONS, Condition
 from sensor.dataset import Run, write_run
 from sensor.errors import SensorError
+from sensor.features import residuals
 from sensor.metrics import evaluate
 from sensor.recipe import FirRecipe
 
@@ -31,20 +35,123 @@ def known_run(name: str, count: int, seed: int) -> Run:
     return run_of(name, channels, truth)
 
 
+def moving_run(name: str, count: int, seed: int) -> Run:
+    """Driving straight on at changing speed, its wheels 20 mm/s off: what residuals are made for.
+
+    The truth is a filter of two residuals and Car.az; raw wheel speeds hide it behind the driving.
+    """
+    random = np.random.default_rng(seed)
+    channels = random.normal(0.0, 1e-3, (count, 14))
+    channels[:, 2] *= 100.0
+    channels[:, 6] = 20.0 + 5.0 * np.sin(np.arange(count) / 50.0)
+    channels[:, 9:13] = channels[:, [6]] + random.normal(0.0, 0.02, (count, 4))
+    truth = np.zeros((count, 4))
+    truth[:, 0] = 0.5 * residuals(channels)[:, 0] + 0.01 * channels[:, 2]
+    truth[:, 3] = -0.3 * residuals(channels)[:, 3]
+    return run_of(name, channels, truth)
+
+
+def fitted(runs: list[Run], ridge: float = 1e-12) -> FirFilter:
+    return fit_best(FirRecipe(window=WINDOW, ridges=(ridge,)), "ideal", runs, runs)
+
+
 def test_fir_recovers_a_known_filter() -> None:
-    runs = [known_run("a", 900, 1), known_run("b", 700, 2), known_run("short", 3, 3)]
-    fir = FirFilter.fit(runs, WINDOW, ridge=1e-12)
+    fir = fitted([known_run("a", 900, 1), known_run("b", 700, 2), known_run("short", 3, 3)])
     np.testing.assert_allclose(fir.weights, TRUE_WEIGHTS, rtol=0.0, atol=1e-3)
     other = known_run("c", 500, 4)
-    assert (
-        evaluate(fir.apply(other.channels, COMMANDS[:500]), other.truth.astype(float)).overall.rmse
-        < 1e-5
+    estimate = fir.apply(other.channels, COMMANDS[:500])
+    assert evaluate(estimate, other.truth.astype(float)).overall.rmse < 1e-5
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_normal_equations_against_every_window_written_out(condition: Condition) -> None:
+    samples = Samples([known_run("a", 60, 1), known_run("b", 41, 2)], condition, "residual", 2)
+    standard = Standard.of(samples)
+    equations = NormalEquations.of(samples, WINDOW, standard)
+    rows, targets = [], []
+    for features, truth in samples:
+        x = (features - standard.input_mean) / standard.input_std
+        y = (truth - standard.output_mean) / standard.output_std
+        for k in range(WINDOW - 1, len(x)):
+            rows.append(np.append(x[k - WINDOW + 1 : k + 1].reshape(-1), 1.0))
+            targets.append(y[k])
+    a, b = np.array(rows), np.array(targets)
+    assert equations.count == len(a) == (1 if condition == "ideal" else 2) * (56 + 37)
+    np.testing.assert_allclose(equations.gram, a.T @ a, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(equations.moment, a.T @ b, rtol=0.0, atol=1e-9)
+    weights = np.random.default_rng(0).normal(size=(a.shape[1], 4))
+    error = (a @ weights - b) * standard.output_std
+    np.testing.assert_allclose(equations.rmse(weights), np.sqrt(np.mean(error**2, axis=0)))
+    ridge = 1e-2
+    penalty = ridge * len(a) * np.eye(a.shape[1])
+    penalty[-1, -1] = 0.0
+    stacked = np.vstack([a, np.sqrt(penalty)])
+    expected = np.linalg.lstsq(stacked, np.vstack([b, np.zeros((a.shape[1], 4))]), rcond=None)[0]
+    np.testing.assert_allclose(equations.solve(ridge), expected, rtol=0.0, atol=1e-9)
+
+
+def test_mean_and_deviation_against_numpy() -> None:
+    samples = Samples([known_run("a", 60, 1), known_run("b", 41, 2)])
+    features = np.vstack([x for x, _ in samples])
+    standard = Standard.of(samples)
+    np.testing.assert_allclose(standard.input_mean, features.mean(axis=0))
+    np.testing.assert_allclose(standard.input_std, features.std(axis=0))
+    with pytest.raises(SensorError, match="no run"):
+        Standard.of(Samples([]))
+    with pytest.raises(SensorError, match="window of 200"):
+        NormalEquations.of(samples, 200, standard)
+
+
+def test_production_runs_are_measured_anew_each_time() -> None:
+    run = known_run("a", 30, 1)
+    first, second = (x for x, _ in Samples([run], "production", "raw", 2))
+    assert (first != second).any(axis=0).all()
+    np.testing.assert_array_equal(first, next(iter(Samples([run], "production")))[0])
+
+
+def test_residual_channels_show_what_raw_ones_hide() -> None:
+    training, unseen = [moving_run("a", 900, 1)], moving_run("b", 400, 2)
+    errors = {}
+    for kind in ("raw", "residual"):
+        recipe = FirRecipe(window=WINDOW, channels=kind, ridges=(1e-3,))
+        fir = fit_best(recipe, "ideal", training, training)
+        estimate = fir.apply(unseen.channels, unseen.commands)
+        errors[kind] = evaluate(estimate, unseen.truth.astype(float)).overall.rmse
+        assert fir.channels == kind
+    assert errors["residual"] < 0.5 * errors["raw"]
+
+
+def test_ablation_names_the_channels_that_carry_the_truth() -> None:
+    training, unseen = [moving_run("a", 900, 1)], [moving_run("b", 400, 2)]
+    recipe = FirRecipe(window=WINDOW, channels="residual", ridges=(1e-9, 1e-6))
+    found = {a.without: a for a in ablation("ideal", training, unseen, recipe)}
+    assert set(found) == {None, *GROUPS}
+    whole = found[None]
+    assert whole.accuracy > 99.0
+    assert found["steering angles"].rmse == pytest.approx(whole.rmse, abs=1e-5)
+    assert found["wheel speeds"].rmse > found["IMU accelerations"].rmse > 10.0 * whole.rmse
+    # what is left without the wheel speeds is the truth that they make
+    made = 0.02 * np.sqrt((0.5**2 + 0.3**2) / 4.0)
+    assert found["wheel speeds"].rmse == pytest.approx(made, rel=0.1)
+    assert whole.rmse == pytest.approx(np.sqrt(np.mean(np.square(whole.wheels))))
+
+
+def test_leaving_channels_out_is_fitting_without_them() -> None:
+    """Against a fit to runs in which those channels never move."""
+    runs = [known_run("a", 300, 1)]
+    still = [run_of("a", np.where(np.arange(14) < 3, 1.0, runs[0].channels), runs[0].truth)]
+    recipe = FirRecipe(window=WINDOW, ridges=(1e-6,))
+    full, _ = equations(recipe, "ideal", runs, runs)
+    fewer, _ = equations(recipe, "ideal", still, still)
+    np.testing.assert_allclose(
+        full.without([0, 1, 2]).solve(1e-6), fewer.solve(1e-6), rtol=0.0, atol=1e-9
     )
 
 
-def test_fir_streaming_equals_batch() -> None:
-    fir = FirFilter(TRUE_WEIGHTS, TRUE_BIAS)
-    samples = known_run("a", 60, 1).channels.astype(np.float64)
+@pytest.mark.parametrize("kind", ["raw", "residual"])
+def test_fir_streaming_equals_batch(kind: Features) -> None:
+    fir = FirFilter(TRUE_WEIGHTS, TRUE_BIAS, channels=kind)
+    samples = moving_run("a", 60, 1).channels.astype(np.float64)
     expected = fir.apply(samples, COMMANDS[:60])
     for _ in range(2):
         streamed = []
@@ -55,13 +162,18 @@ def test_fir_streaming_equals_batch() -> None:
         fir.reset()
         assert np.isnan(fir.estimate).all()
     assert np.isnan(fir.apply(samples[:4], COMMANDS[:4])).all()
+    bad = samples[0].copy()
+    bad[6] = np.nan
+    with pytest.raises(SensorError, match=r"Car\.vx is nan\.$"):
+        fir.step(bad, COMMANDS[0])
 
 
 def test_fir_file_round_trip_and_mismatch(tmp_path: Path) -> None:
-    FirFilter(TRUE_WEIGHTS, TRUE_BIAS, {"ridge": 0.5}).save(tmp_path / "fir.npz")
+    FirFilter(TRUE_WEIGHTS, TRUE_BIAS, {"ridge": 0.5}, "residual").save(tmp_path / "fir.npz")
     fir = FirFilter.load(tmp_path / "fir.npz")
-    np.testing.assert_array_equal(fir.weights, TRUE_WEIGHTS)
-    np.testing.assert_array_equal(fir.bias, TRUE_BIAS)
+    np.testing.assert_array_equal(fir.weights, TRUE_WEIGHTS.astype(np.float32))
+    np.testing.assert_array_equal(fir.bias, TRUE_BIAS.astype(np.float32))
+    assert fir.channels == "residual"
     assert fir.training == {"ridge": 0.5}
     with np.load(tmp_path / "fir.npz") as content:
         arrays = dict(content)
@@ -76,7 +188,8 @@ def test_fir_file_round_trip_and_mismatch(tmp_path: Path) -> None:
 
 def test_best_ridge_is_chosen_in_validation() -> None:
     training, validation = [known_run("a", 300, 1)], [known_run("b", 300, 2)]
-    fir = fit_best(FirRecipe(window=WINDOW, ridges=(1e3, 1e-9, 1.0)), training, validation)
+    recipe = FirRecipe(window=WINDOW, ridges=(1e3, 1e-9, 1.0))
+    fir = fit_best(recipe, "ideal", training, validation)
     assert fir.training["ridge"] == 1e-9
     assert fir.training["validation_rmse"] < 1e-4
 
@@ -85,11 +198,16 @@ def test_fit_command(tmp_path: Path) -> None:
     for name, seed in (("a", 1), ("b", 2)):
         write_run(tmp_path / f"{name}.parquet", known_run(name, 300, seed))
     recipe = tmp_path / "r.yaml"
-    recipe.write_text("name: t\nfir: {window: 5}\nruns: {training: [a], validation: [b]}\n")
+    recipe.write_text("name: t\nruns: {training: [a], validation: [b]}\n")
     arguments = ["--data", str(tmp_path), "--recipe", str(recipe), "--out", str(tmp_path / "m")]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
-    assert FirFilter.load(tmp_path / "m" / "fir_w5.npz").window == WINDOW
+    files = {path.stem for path in (tmp_path / "m").iterdir()}
+    assert files == {f"{name}_{condition}" for name in FILTERS for condition in CONDITIONS}
+    fir = FirFilter.load(tmp_path / "m" / "fir_residual_w64_production.npz")
+    assert (fir.window, fir.channels) == (64, "residual")
+    assert fir.training["command"].endswith("--recipe r.yaml")
+    assert fir.training["training_runs"] == ["a"]
     recipe.write_text("name: t\nfirr: {}\nruns: {training: [a], validation: [nothing]}\n")
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 2

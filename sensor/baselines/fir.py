@@ -1,20 +1,17 @@
-"""The linear filter over the same window: four weighted sums of W samples x 14 channels, fitted by
-ridge regression.
+"""The linear filter: four weighted sums of the last W samples of 14 channels.
 
-Channels are standardised first, so that one ridge fits all. The normal equations (W*14+1 unknowns)
-are accumulated run by run in double precision; only the sums are kept, so the data set may be
-larger than memory.
+With channels "residual" the four wheel speeds are replaced by their residuals (`sensor.features`),
+which are computed from the sample itself. Weights come from `sensor.baselines.fit`.
 """
 
 import json
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from sensor.baselines.normal_equations import Features
 from sensor.channels import (
     CHANNEL_NAMES,
     CHANNEL_UNITS,
@@ -25,64 +22,12 @@ from sensor.channels import (
     SAMPLE_RATE_HZ,
     check_channels,
 )
-from sensor.dataset import Normalisation, Run
 from sensor.errors import SensorError
-from sensor.window import Window
+from sensor.features import WHEEL_SPEEDS, WheelSpeedResiduals, with_residuals
+from sensor.window import Window, check_sample
 
 Array = npt.NDArray[np.float64]
 _CHUNK = 4096
-
-
-@dataclass(frozen=True)
-class NormalEquations:
-    """Sums over all windows, standardised, bias last: `gram` (p, p), `moment` (p, 4), p = W*14+1;
-    `count` windows.
-    """
-
-    window: int
-    normalisation: Normalisation
-    gram: Array
-    moment: Array
-    count: int
-
-    @classmethod
-    def of(
-        cls, runs: Iterable[Run], window: int, normalisation: Normalisation
-    ) -> "NormalEquations":
-        """Accumulate over runs; raises SensorError if none is as long as the window."""
-        size = window * len(CHANNELS) + 1
-        gram, moment, count = np.zeros((size, size)), np.zeros((size, len(OUTPUTS))), 0
-        n = normalisation
-        for run in runs:
-            if len(run.channels) < window:
-                continue
-            samples = (run.channels.astype(np.float64) - n.input_mean) / n.input_std
-            truth = (run.truth.astype(np.float64) - n.output_mean) / n.output_std
-            windows = _windows(samples, window)
-            for start in range(0, len(windows), _CHUNK):
-                chunk = windows[start : start + _CHUNK]
-                features = np.ones((len(chunk), size))
-                features[:, :-1] = chunk.reshape(len(chunk), -1)
-                first = window - 1 + start
-                gram += features.T @ features
-                moment += features.T @ truth[first : first + len(chunk)]
-                count += len(chunk)
-        if count == 0:
-            raise SensorError(f"no run is as long as the filter's window of {window} samples.")
-        return cls(window, normalisation, gram, moment, count)
-
-    def solve(self, ridge: float) -> "FirFilter":
-        """Minimise mean square error + ridge * |weights|^2, all standardised; the bias is free."""
-        penalty = np.full(len(self.gram), ridge * self.count)
-        penalty[-1] = 0.0
-        solution = np.linalg.solve(self.gram + np.diag(penalty), self.moment)
-        n = self.normalisation
-        # Into physical units: the standardisation becomes part of weights and bias.
-        weights = solution[:-1].reshape(self.window, len(CHANNELS), len(OUTPUTS))
-        weights = weights * n.output_std / n.input_std[:, np.newaxis].astype(np.float64)
-        bias = solution[-1] * n.output_std + n.output_mean
-        bias = bias - np.einsum("wco,c->o", weights, n.input_mean.astype(np.float64))
-        return FirFilter(weights, bias, {"ridge": ridge, "windows": self.count})
 
 
 class FirFilter:
@@ -90,18 +35,23 @@ class FirFilter:
     units to m/s.
     """
 
-    def __init__(self, weights: Array, bias: Array, training: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        weights: Array,
+        bias: Array,
+        training: dict[str, Any] | None = None,
+        channels: Features = "raw",
+    ) -> None:
         self.weights, self.bias, self.training = weights, bias, training or {}
-        self.window = len(weights)
-        self._flat = np.ascontiguousarray(weights.reshape(-1, len(OUTPUTS)))
+        self.window, self.channels = len(weights), channels
+        self._flat = np.ascontiguousarray(weights.reshape(-1, len(OUTPUTS)), dtype=np.float64)
         self._buffer = Window(self.window, np.float64)
+        self._residuals = WheelSpeedResiduals() if channels == "residual" else None
+        self._features = np.zeros(len(CHANNELS))
+        self._magnitude = np.zeros(len(CHANNELS))
+        self._fits = np.zeros(len(CHANNELS), dtype=np.bool_)
         self.estimate = np.full(len(OUTPUTS), np.nan)
         self.deviation = np.full(len(OUTPUTS), np.nan)
-
-    @classmethod
-    def fit(cls, runs: Sequence[Run], window: int = 19, ridge: float = 1e-6) -> "FirFilter":
-        """Fit on runs; raises SensorError if none is as long as the window."""
-        return NormalEquations.of(runs, window, Normalisation.of(runs)).solve(ridge)
 
     def reset(self) -> None:
         """Forget all samples."""
@@ -109,8 +59,15 @@ class FirFilter:
         self.estimate.fill(np.nan)
 
     def step(self, measured: Array, command: Array) -> bool:
-        """Take one sample (14,) in SI units, update `estimate`; return whether it is valid."""
-        if not self._buffer.push(measured):
+        """Take one sample (14,) in SI units, update `estimate`; return whether it is valid.
+
+        Raises SensorError naming a channel that is NaN or infinite; such a sample is not taken.
+        """
+        check_sample(measured, self._magnitude, self._fits)
+        self._features[:] = measured
+        if self._residuals is not None:
+            self._features[WHEEL_SPEEDS] = self._residuals.step(measured)
+        if not self._buffer.push(self._features):
             return False
         np.matmul(self._buffer.values.reshape(-1), self._flat, out=self.estimate)
         self.estimate += self.bias
@@ -123,26 +80,30 @@ class FirFilter:
         result = np.full((len(channels), len(OUTPUTS)), np.nan)
         if len(channels) < self.window:
             return result
-        windows = _windows(np.asarray(channels, dtype=np.float64), self.window)
+        features = np.asarray(channels, dtype=np.float64)
+        if self.channels == "residual":
+            features = with_residuals(features)
+        windows = np.lib.stride_tricks.sliding_window_view(features, self.window, axis=0)
+        windows = windows.transpose(0, 2, 1)  # (samples - W + 1, W, 14), oldest sample first
         for start in range(0, len(windows), _CHUNK):
-            chunk = windows[start : start + _CHUNK]
+            chunk = windows[start : start + _CHUNK].reshape(-1, len(self._flat))
             first = self.window - 1 + start
-            result[first : first + len(chunk)] = (
-                chunk.reshape(len(chunk), -1) @ self._flat + self.bias
-            )
+            result[first : first + len(chunk)] = chunk @ self._flat + self.bias
         return result
 
     def save(self, path: str | Path) -> None:
-        """Write an .npz file with the same metadata as a network."""
+        """Write an .npz file, weights in single precision, with the same metadata as a network."""
         about = {
             "window": self.window,
+            "channels": self.channels,
             "sample_rate_hz": SAMPLE_RATE_HZ,
             "inputs": {"names": CHANNEL_NAMES, "units": CHANNEL_UNITS},
             "outputs": {"names": OUTPUT_NAMES, "units": OUTPUT_UNITS},
             "training": self.training,
         }
         text = json.dumps(about, sort_keys=True)
-        np.savez(path, weights=self.weights, bias=self.bias, metadata=np.array(text))
+        weights, bias = self.weights.astype(np.float32), self.bias.astype(np.float32)
+        np.savez_compressed(path, weights=weights, bias=bias, metadata=np.array(text))
 
     @classmethod
     def load(cls, path: str | Path) -> "FirFilter":
@@ -151,18 +112,15 @@ class FirFilter:
         """
         try:
             with np.load(path, allow_pickle=False) as content:
-                weights, bias = content["weights"], content["bias"]
+                weights = content["weights"].astype(np.float64)
+                bias = content["bias"].astype(np.float64)
                 about = json.loads(str(content["metadata"]))
             inputs, outputs, rate = about["inputs"], about["outputs"], about["sample_rate_hz"]
+            channels, training = about["channels"], about["training"]
         except (OSError, ValueError, KeyError) as error:
             raise SensorError(f"{path}: it cannot be read as a linear filter: {error}") from error
         check_channels(f"{path}, inputs", inputs["names"], inputs["units"], CHANNELS)
         check_channels(f"{path}, outputs", outputs["names"], outputs["units"], OUTPUTS)
         if rate != SAMPLE_RATE_HZ:
             raise SensorError(f"{path}: it expects {rate:g} Hz, where {SAMPLE_RATE_HZ} Hz belongs.")
-        return cls(weights, bias, about["training"])
-
-
-def _windows(samples: Array, window: int) -> Array:
-    """View samples (n, 14) as windows (n - W + 1, W, 14), oldest sample first."""
-    return np.lib.stride_tricks.sliding_window_view(samples, window, axis=0).transpose(0, 2, 1)
+        return cls(weights, bias, training, channels)
