@@ -55,13 +55,13 @@ dataset: $(VENV)/test.stamp ## the runs behind the published network (about thre
 train: dataset ## the published network and filter (about 25 minutes on 2 cores); resumes where it was stopped
 	$(BIN)/python -m sensor.baselines.fit --data $(DATA) --recipe sensor/recipes/paper.yaml --out sensor/models
 	$(BIN)/python -m sensor.train --data $(DATA) --recipe sensor/recipes/paper.yaml --out build/training --resume
-	cp build/training/bilstm_w19.onnx sensor/models/
-	cp build/training/training.json sensor/models/bilstm_w19.json
+	cp build/training/bilstm_w19.onnx sensor/models/bilstm_w19_ideal.onnx
+	cp build/training/training.json sensor/models/bilstm_w19_ideal.json
 
 figures: $(VENV)/test.stamp ## the paper's 29 rows on three surfaces: docs/paper-scenarios.md and the model card (about five minutes)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/measure/paper_rows.py
-	$(BIN)/python -m sensor.model_card --model sensor/models/bilstm_w19.onnx \
-	    --training sensor/models/bilstm_w19.json --figures build/figures.json
+	$(BIN)/python -m sensor.model_card --model sensor/models/bilstm_w19_ideal.onnx \
+	    --training sensor/models/bilstm_w19_ideal.json --figures build/figures.json
 
 roads: $(VENV)/test.stamp ## surfaces, bumpy road and road scenarios: the tables of docs/roads.md (about four minutes)
 	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/surfaces.py

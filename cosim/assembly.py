@@ -17,7 +17,7 @@ from cosim.comfort import ride_figures
 from cosim.controller import FixedDampers, Skyhook, damper_map
 from cosim.course import Course, course_of
 from cosim.driver import PathDriver
-from cosim.errors import InputError, NetworkError, Problem
+from cosim.errors import InputError, Problem
 from cosim.fmi import Description, Value
 from cosim.grip import grip_figures
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
@@ -39,12 +39,13 @@ from cosim.recorder import Recorder, Signal
 from cosim.scenario.controllers import Passive
 from cosim.scenario.controllers import Skyhook as SkyhookSettings
 from cosim.scenario.schema import Scenario
+from cosim.sensor import estimator_file, estimator_of, measurement_of, stage_problems
 from cosim.start import builtin_start, checked_parameters
 from cosim.vehicle import Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
-from sensor import OUTPUTS, SAMPLE_RATE_HZ, OnnxSensor, SensorError, default_model
+from sensor import CHANNELS, OUTPUTS, SAMPLE_RATE_HZ
 from sensor.channels import PASSIVE_COMMAND
-from sensor.conditions import PRODUCTION_PARAMETERS
+from sensor.conditions import PRODUCTION_PARAMETERS, Condition
 
 Array = npt.NDArray[np.float64]
 
@@ -72,7 +73,7 @@ class RunResult:
 
 @dataclass
 class Assembly:
-    """The blocks of one run. `files` decide the result: fmu, network, road; `initial_command` (4,)
+    """The blocks of one run. `files` decide the result: fmu, sensor, road; `initial_command` (4,)
     is what the dampers hold before the first sample.
     """
 
@@ -118,7 +119,7 @@ def check(scenario: Scenario) -> float:
     wrong, `FmuError` or `NetworkError` for a file that does not load.
     """
     *_, plan = checked_parts(scenario)
-    _network(scenario)
+    estimator_file(scenario)
     return _steps(scenario, plan)[0] * STEP_S
 
 
@@ -135,24 +136,24 @@ def assemble(
     does not load.
     """
     wiring, description, course, plan = checked_parts(scenario)
-    network = None
+    file = None
     if sensor is None:
-        network = _network(scenario)
-        sensor = _sensor(network)
+        file = estimator_file(scenario)
+        sensor = estimator_of(scenario)
     passive = isinstance(controller, Passive) and dampers is None
     start = _start_values(scenario, description, course, plan, passive)
     block = dampers or _controller(scenario, controller)
     steps, if_late = _steps(scenario, plan)
     driver = plan.driver(STEP_S, friction_of(scenario))
-    recorder = Recorder(record_groups(), steps + 1, STEP_S)
+    recorder = Recorder(record_groups(scenario.sensor.condition), steps + 1, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, block.command)
-    files = {"fmu": description.path, "network": network, "road": course.file}
+    files = {"fmu": description.path, "sensor": file, "road": course.file}
     files |= {f"variant {name}": path for name, path in scenario.variants.files.items()}
     return Assembly(
         recorder=recorder,
         initial_command=block.command.copy(),
         files={name: path for name, path in files.items() if path is not None},
-        blocks=Blocks(vehicle, driver, sensor, block),
+        blocks=Blocks(vehicle, driver, measurement_of(scenario), sensor, block),
         vehicle=vehicle,
         driver=driver,
         plan=plan,
@@ -161,12 +162,15 @@ def assemble(
     )
 
 
-def record_groups() -> list[tuple[str, list[Signal]]]:
-    """Return the groups of the record, in the order of the loop."""
+def record_groups(condition: Condition = "ideal") -> list[tuple[str, list[Signal]]]:
+    """Return the groups of the record, in the order of the loop. The channels are those measured;
+    where they are not ideal, the ideal ones come last.
+    """
 
     def signals(quantities: tuple[Quantity, ...]) -> list[Signal]:
         return [Signal(q.name, q.unit if q.unit != "1" else "", q.description) for q in quantities]
 
+    ideal = [Signal(f"Ideal.{c.name}", c.unit, f"{c.description}, exactly") for c in CHANNELS]
     return [
         ("channels", signals(CHANNEL_QUANTITIES)),
         ("estimate", [Signal(o.name, o.unit, o.description) for o in OUTPUTS]),
@@ -175,6 +179,7 @@ def record_groups() -> list[tuple[str, list[Signal]]]:
         ("command", signals(DAMPERS)),
         ("driver", signals(DRIVER)),
         ("vehicle", signals(RECORDED)),
+        ("ideal", ideal if condition != "ideal" else []),
     ]
 
 
@@ -193,6 +198,7 @@ def checked_parts(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan
         else mapped_wiring(description, settings.variables, scenario.problem)
     )
     problems += checked_parameters(scenario, description)
+    problems += stage_problems(scenario, wiring, description.path.name)
     found = None
     try:
         found = _planned(scenario)
@@ -236,21 +242,6 @@ def _start_values(
     own = {**PRODUCTION_PARAMETERS, **own}
     known = {name: value for name, value in own.items() if name in description.variables}
     return known | scenario.parameters
-
-
-def _network(scenario: Scenario) -> Path:
-    name = scenario.sensor.network
-    try:
-        return default_model() if name == "default" else scenario.resolve(name)
-    except SensorError as error:
-        raise NetworkError(str(error)) from None
-
-
-def _sensor(network: Path) -> OnnxSensor:
-    try:
-        return OnnxSensor(network)
-    except SensorError as error:
-        raise NetworkError(str(error)) from None
 
 
 def _controller(scenario: Scenario, settings: Passive | SkyhookSettings) -> ControllerBlock:

@@ -1,4 +1,4 @@
-"""From a record to figures: network and baselines against the truth, on the same samples."""
+"""From a record to figures: sensor and baselines against the truth, on the same samples."""
 
 from __future__ import annotations
 
@@ -9,25 +9,29 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.controller import held
-from cosim.metrics import WHEELS
+from cosim.metrics import BASELINES, WHEELS
 from cosim.recorder import Recorder
-from sensor import FirFilter, SensorError, StillWheels, Zero, default_fir, evaluate
+from sensor import SensorError, evaluate
+from sensor.conditions import Condition
 from sensor.estimator import Estimator
+from sensor.estimators import make
 from sensor.metrics import rms
 from sensor.paper import paper_rows
 
 Array = npt.NDArray[np.float64]
 
 
-def compare(recorder: Recorder, initial_command: Array) -> dict[str, Any]:
+def compare(
+    recorder: Recorder, initial_command: Array, condition: Condition = "ideal"
+) -> dict[str, Any]:
     """Return the figures of every estimator, per wheel and overall, and the rms of the truth.
 
     `recorder` has the groups channels (rows, 14), estimate (rows, 4) [m/s], valid (rows, 1), truth
     (rows, 4) [m/s] and command (rows, 4), `initial_command` (4,) is the one before the first. Only
-    rows where the network is valid and every estimate exists count, the same for all. Without such
+    rows where the sensor is valid and every estimate exists count, the same for all. Without such
     a row there are no figures but `valid_samples`, which is 0.
     """
-    truth, estimates, rows = estimates_of(recorder, initial_command)
+    truth, estimates, rows = estimates_of(recorder, initial_command, condition)
     figures: dict[str, Any] = {"valid_samples": int(rows.sum())}
     if not rows.any():
         return figures
@@ -38,15 +42,17 @@ def compare(recorder: Recorder, initial_command: Array) -> dict[str, Any]:
 
 
 def estimates_of(
-    recorder: Recorder, initial_command: Array
+    recorder: Recorder, initial_command: Array, condition: Condition = "ideal"
 ) -> tuple[Array, dict[str, Array], npt.NDArray[np.bool_]]:
     """Return the truth and each estimator's velocities (rows, 4) [m/s], and the rows that count."""
     channels, truth = recorder.group("channels"), recorder.group("truth")
-    estimates = {"network": recorder.group("estimate")}
+    estimates = {"sensor": recorder.group("estimate")}
     rows = recorder.group("valid")[:, 0] > 0
     if len(channels):
         commands = held(recorder.group("command"), initial_command)
-        estimates |= {name: b.apply(channels, commands) for name, b in _baselines().items()}
+        estimates |= {
+            name: b.apply(channels, commands) for name, b in _baselines(condition).items()
+        }
     for estimate in estimates.values():
         rows = rows & np.isfinite(estimate).all(axis=1)
     return truth, estimates, rows
@@ -62,11 +68,12 @@ def paper_figures(name: str | None) -> dict[str, Any] | None:
     return {"row": row.scenario, "split": row.split, **wheels, "overall": overall}
 
 
-def _baselines() -> dict[str, Estimator]:
+def _baselines(condition: Condition) -> dict[str, Estimator]:
     """Return the baselines that this installation has; the fitted filter is shipped or is not."""
-    baselines: dict[str, Estimator] = {"body_motion": StillWheels(), "zero": Zero()}
-    with suppress(SensorError):
-        baselines["fir"] = FirFilter.load(default_fir())
+    baselines = {}
+    for name, estimator in BASELINES.items():
+        with suppress(SensorError):
+            baselines[name] = make(estimator, condition)
     return baselines
 
 

@@ -78,7 +78,7 @@ def check_metric(metric: str, labels: Sequence[str], manoeuvre: str | None = Non
         here = f"not of {manoeuvre}" if manoeuvre else "and this scenario has none"
         return f"'{metric}' is a figure of the manoeuvre {kinds}, {here}"
     hint = did_you_mean(metric, names)
-    return f"'{metric}' is not a metric{hint or ', such as network.overall.accuracy_percent'}"
+    return f"'{metric}' is not a metric{hint or ', such as sensor.overall.accuracy_percent'}"
 
 
 def _kinds_of(metric: str, labels: Sequence[str]) -> str:

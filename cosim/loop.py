@@ -20,6 +20,7 @@ from cosim.vehicle import State
 Array = npt.NDArray[np.float64]
 
 PROGRESS_STEPS = 50
+NOTHING = np.zeros(0)  # recorded in the place of ideal channels that are the measured ones
 
 
 class VehicleBlock(Protocol):
@@ -44,6 +45,15 @@ class DriverBlock(Protocol):
         """Return steering-wheel angle [rad], accelerator and brake (0..1), (3,)."""
 
 
+class MeasurementBlock(Protocol):
+    """Measures the channels as a car does."""
+
+    def step(self, channels: Array, stage: Array) -> Array:
+        """Take the ideal channels (14,) and what the vehicle's sensors deliver (11,); return the
+        channels as measured (14,), `channels` itself where they are ideal.
+        """
+
+
 class SensorBlock(Protocol):
     """Estimates the suspension velocities."""
 
@@ -66,10 +76,11 @@ class ControllerBlock(Protocol):
 
 @dataclass(frozen=True)
 class Blocks:
-    """The four roles."""
+    """The four roles, and the measurement between vehicle and sensor."""
 
     vehicle: VehicleBlock
     driver: DriverBlock
+    measurement: MeasurementBlock
     sensor: SensorBlock
     controller: ControllerBlock
 
@@ -84,18 +95,19 @@ def run(
 
     Whatever raises on the way leaves the rows before it in the recorder.
     """
-    vehicle, driver, sensor, controller = (
-        blocks.vehicle, blocks.driver, blocks.sensor, blocks.controller,
-    )  # fmt: skip
+    vehicle, driver, measurement = blocks.vehicle, blocks.driver, blocks.measurement
+    sensor, controller = blocks.sensor, blocks.controller
     command = controller.command  # the vehicle stands at t_0 with the initial one
     for k in range(steps + 1):
         state = vehicle.read()  # vehicle -> outputs at t_k
         vehicle.check_finite(k)
-        valid = sensor.step(state.channels, command)  # channels -> estimates, or invalid
-        command = controller.step(state.channels, sensor.estimate, valid, state.truth)
+        measured = measurement.step(state.channels, state.stage)  # outputs -> channels of a car
+        valid = sensor.step(measured, command)  # channels -> estimates, or invalid
+        command = controller.step(measured, sensor.estimate, valid, state.truth)
         pedals = driver.step(k, state)
+        ideal = NOTHING if measured is state.channels else state.channels
         recorder.append(
-            k, state.channels, sensor.estimate, valid, state.truth, command, pedals, state.recorded
+            k, measured, sensor.estimate, valid, state.truth, command, pedals, state.recorded, ideal
         )
         if progress is not None and k % PROGRESS_STEPS == 0:
             progress(k, steps)

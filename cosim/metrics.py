@@ -1,7 +1,9 @@
 """Names and units of the figures in metrics.json, known before anything runs.
 
-metrics.json is `{"scenario", "runs": {label: figures}, "limits": [...], "paper": {...} or null}`.
-A limit names a figure by its dotted path within a run, such as `network.overall.accuracy_percent`;
+metrics.json is `{"scenario", "sensor": its settings, "runs": {label: figures}, "limits": [...],
+"paper": {...} or null}`. In a run, `sensor` are the figures of the scenario's estimator, and the
+baselines stand beside it.
+A limit names a figure by its dotted path within a run, such as `sensor.overall.accuracy_percent`;
 it is checked in every run, unless it begins with the name of one run:
 `skyhook_estimate.comfort.tyre_load_rms_n`.
 """
@@ -13,7 +15,9 @@ from typing import Any, Final
 
 WHEELS: Final = ("FL", "FR", "RL", "RR")
 PARTS: Final = (*WHEELS, "overall")
-ESTIMATORS: Final = ("network", "fir", "body_motion", "zero")
+BASELINES: Final = {"fir": "fir_w19", "body_motion": "body_motion", "zero": "zero"}
+"""What stands beside the sensor in every run, and its name among the estimators."""
+ESTIMATORS: Final = ("sensor", *BASELINES)
 ERROR_FIGURES: Final = (
     "rmse_m_s",
     "nrmse",

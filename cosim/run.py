@@ -90,7 +90,7 @@ class Assembly(Protocol):
 
     @property
     def files(self) -> Mapping[str, Path]:
-        """Files that decide the result, such as `fmu`, `network` and `road`, to be hashed."""
+        """Files that decide the result, such as `fmu`, `sensor` and `road`, to be hashed."""
 
     def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
         """Run to the end; `progress` is told steps done and steps at most."""
@@ -228,7 +228,7 @@ def _run(
         "wall_time_s": result.wall_time_s,
         "largest_deviation_m": result.largest_deviation_m,
         "real_time_factor": result.simulated_s / max(result.wall_time_s, 1e-9),
-        **compare(assembly.recorder, assembly.initial_command),
+        **compare(assembly.recorder, assembly.initial_command, scenario.sensor.condition),
         "comfort": dict(result.comfort),
         "manoeuvre": dict(result.manoeuvre),
         "grip": dict(result.grip),
@@ -245,6 +245,7 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
     metrics = finite(
         {
             "scenario": scenario.name,
+            "sensor": scenario.sensor.model_dump(mode="json", exclude_none=True),
             "runs": figures,
             "limits": [asdict(verdict) for verdict in verdicts],
             "paper": paper_figures(row_of(scenario)),
@@ -316,7 +317,7 @@ def resolved_yaml(scenario: Scenario) -> str:
     if scenario.vehicle.fmu != "builtin":
         data["vehicle"]["fmu"] = str(scenario.resolve(scenario.vehicle.fmu).resolve())
         del data["vehicle"]["fmi_version"]
-    if scenario.sensor.network != "default":
+    if scenario.sensor.network is not None:
         data["sensor"]["network"] = str(scenario.resolve(scenario.sensor.network).resolve())
     yaml = YAML()
     yaml.width = 100

@@ -19,7 +19,7 @@ from cosim.metrics import (
 from sensor.metrics import LEAST_TRUTH_RMS
 
 NAMES: Final = {
-    "network": "Network",
+    "sensor": "Sensor",
     "fir": "Linear FIR",
     "body_motion": "Body motion only",
     "zero": "Zero",
@@ -76,7 +76,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def estimate_table(figures: Mapping[str, Any], paper: Mapping[str, Any] | None = None) -> Table:
-    """Return the errors of network and baselines at each wheel, and the paper's row if any."""
+    """Return the errors of sensor and baselines at each wheel, and the paper's row if any."""
     columns = (
         "estimate",
         *PARTS,
@@ -122,8 +122,8 @@ def comparison_table(runs: Mapping[str, Mapping[str, Any]]) -> Table:
     rows = []
     for label, figures in runs.items():
         comfort = [_against(first, figures, f"comfort.{name}") for name in COMFORT_FIGURES]
-        rmse = figure(figures, "network.overall.rmse_m_s")
-        accuracy = figure(figures, "network.overall.accuracy_percent")
+        rmse = figure(figures, "sensor.overall.rmse_m_s")
+        accuracy = figure(figures, "sensor.overall.accuracy_percent")
         rows.append((label, *comfort, number(rmse), number(accuracy, 1)))
     return Table("Controllers compared", columns, tuple(rows))
 
@@ -168,7 +168,7 @@ def batch_table(ended: Sequence[tuple[str, int, Mapping[str, Any] | None]]) -> T
         "verdict",
         "simulated [s]",
         "times real time",
-        "network RMSE [m/s]",
+        "sensor RMSE [m/s]",
         "accuracy [%]",
         "largest deviation [m]",
     )
@@ -185,8 +185,8 @@ def batch_table(ended: Sequence[tuple[str, int, Mapping[str, Any] | None]]) -> T
             cells = (
                 number(figure(figures, "simulated_s"), 1),
                 number(figure(figures, "real_time_factor"), 1),
-                number(figure(figures, "network.overall.rmse_m_s")),
-                number(figure(figures, "network.overall.accuracy_percent"), 1),
+                number(figure(figures, "sensor.overall.rmse_m_s")),
+                number(figure(figures, "sensor.overall.accuracy_percent"), 1),
                 number(figure(figures, "largest_deviation_m"), 2),
             )
             rows.append((name, verdict, *cells))

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from sensor.errors import SensorError
     from sensor.estimator import Estimator
     from sensor.metrics import Figures, Metrics, evaluate
-    from sensor.models import default_fir, default_model
     from sensor.runtime import OnnxSensor
 
 _HOME = {
@@ -41,8 +40,6 @@ _HOME = {
     "SensorError": "errors",
     "StillWheels": "baselines",
     "Zero": "baselines",
-    "default_fir": "models",
-    "default_model": "models",
     "evaluate": "metrics",
 }
 
@@ -63,8 +60,6 @@ __all__ = [
     "SensorError",
     "StillWheels",
     "Zero",
-    "default_fir",
-    "default_model",
     "evaluate",
 ]
 

@@ -10,13 +10,11 @@ import pytest
 from foreign_fmu import ECHO, Variable, own_variables, parrot
 from loop_rig import Blind, Guess, write_scenario
 
-from cosim import assembly
 from cosim.assembly import Assembly, assemble, record_groups
 from cosim.controller import FixedDampers
 from cosim.errors import InputError, NetworkError
 from cosim.road import Smooth, build_road, load_track
 from cosim.scenario.load import load
-from sensor import SensorError
 from sensor.channels import PASSIVE_COMMAND
 
 SHORT = "0.05"
@@ -295,12 +293,9 @@ def test_a_network_that_is_none(tmp_path: Path) -> None:
 
 
 def test_an_installation_without_a_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def none() -> Path:
-        raise SensorError("no such model is shipped here")
-
-    monkeypatch.setattr(assembly, "default_model", none)
+    monkeypatch.setattr("sensor.estimators.MODELS", tmp_path)
     scenario = load(write_scenario(tmp_path))
-    with pytest.raises(NetworkError, match="no such model"):
+    with pytest.raises(NetworkError, match="'bilstm_w19' is not shipped for condition ideal"):
         assemble(scenario, scenario.controllers[0])
 
 
@@ -315,7 +310,7 @@ def test_the_record_names_every_column_once_with_its_unit() -> None:
     names = [signal.name for signal in signals]
     assert len(set(names)) == len(names)
     assert [name for name, _ in record_groups()] == [
-        "channels", "estimate", "valid", "truth", "command", "driver", "vehicle",
+        "channels", "estimate", "valid", "truth", "command", "driver", "vehicle", "ideal",
     ]  # fmt: skip
     assert {s.name: s.header for s in signals}["Car.CFL.q0"] == "Car.CFL.q0 [m]"
     assert {s.name: s.header for s in signals}["DM.Gas"] == "DM.Gas"

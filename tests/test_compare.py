@@ -36,10 +36,10 @@ def figures():
 
 
 def test_an_estimate_nine_tenths_of_the_truth_is_90_percent_accurate(figures):
-    assert figures["network"]["overall"]["accuracy_percent"] == pytest.approx(90)
-    assert figures["network"]["RL"]["nrmse"] == pytest.approx(0.1)
-    assert figures["network"]["FL"]["rmse_m_s"] == pytest.approx(0.01 / math.sqrt(2), rel=1e-2)
-    assert figures["network"]["FL"]["max_abs_error_m_s"] == pytest.approx(0.01, rel=1e-2)
+    assert figures["sensor"]["overall"]["accuracy_percent"] == pytest.approx(90)
+    assert figures["sensor"]["RL"]["nrmse"] == pytest.approx(0.1)
+    assert figures["sensor"]["FL"]["rmse_m_s"] == pytest.approx(0.01 / math.sqrt(2), rel=1e-2)
+    assert figures["sensor"]["FL"]["max_abs_error_m_s"] == pytest.approx(0.01, rel=1e-2)
     assert figures["truth"]["overall"]["rms_m_s"] == pytest.approx(0.1 / math.sqrt(2), rel=1e-2)
 
 
@@ -68,19 +68,19 @@ def test_every_promised_metric_is_measured(figures):
 
 
 def test_every_error_figure_has_a_name(figures):
-    assert set(ERROR_FIGURES) == set(figures["network"]["FL"]) - {"accuracy_meaningful"}
+    assert set(ERROR_FIGURES) == set(figures["sensor"]["FL"]) - {"accuracy_meaningful"}
 
 
 @pytest.mark.parametrize(
     ("metric", "unit"),
     [
-        ("network.FL.rmse_m_s", "m/s"),
+        ("sensor.FL.rmse_m_s", "m/s"),
         ("comfort.weighted_acceleration_m_s2", "m/s²"),
-        ("network.overall.accuracy_percent", "%"),
+        ("sensor.overall.accuracy_percent", "%"),
         ("lap_time_s", "s"),
         ("comfort.deflection_rms_m", "m"),
         ("comfort.tyre_load_rms_n", "N"),
-        ("network.FL.nrmse", ""),
+        ("sensor.FL.nrmse", ""),
     ],
 )
 def test_units_are_read_off_the_name(metric, unit):
@@ -122,9 +122,9 @@ def test_a_verdict_says_it_all():
 
 
 def test_a_wrong_metric_gets_a_suggestion():
-    assert check_metric("network.overall.rmse_m_s", []) is None
-    assert check_metric("soft.network.overall.rmse_m_s", ["soft"]) is None
-    assert "'network.FL.rmse_m_s'" in (check_metric("network.FL.rmse", []) or "")
+    assert check_metric("sensor.overall.rmse_m_s", []) is None
+    assert check_metric("soft.sensor.overall.rmse_m_s", ["soft"]) is None
+    assert "'sensor.FL.rmse_m_s'" in (check_metric("sensor.FL.rmse", []) or "")
 
 
 def test_the_papers_row_stands_beside(figures):
@@ -176,4 +176,4 @@ def test_json_never_holds_nan():
 
 
 def test_estimators_are_known():
-    assert ESTIMATORS[0] == "network"
+    assert ESTIMATORS[0] == "sensor"

@@ -30,6 +30,7 @@ from cosim.road.track import Knots, Layout, build_track
 from cosim.speed_profile import STYLES, Style, speed_profile, travel_time
 from cosim.vehicle import State, Vehicle, builtin_fmu
 from cosim.wiring import own_wiring
+from sensor.conditions import Measurement
 
 Array = npt.NDArray[np.float64]
 
@@ -284,7 +285,8 @@ def drive(
     steps = round(1.3 * expected / STEP_S)
     recorder = Recorder(record_groups(), steps + 1, STEP_S)
     try:
-        run_loop(Blocks(vehicle, driver, Blind(), FixedDampers()), recorder, steps)
+        blocks = Blocks(vehicle, driver, Measurement("ideal", 1), Blind(), FixedDampers())
+        run_loop(blocks, recorder, steps)
     finally:
         vehicle.close()
     return Drive(expected, driver.finished, driver.largest_deviation, recorder)

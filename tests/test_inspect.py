@@ -23,7 +23,7 @@ from cosim.inspect.kind import recognise
 from cosim.inspect.onnx_file import OnnxError, read_onnx
 from sensor.channels import CHANNEL_NAMES
 
-NETWORK = ROOT / "sensor" / "models" / "bilstm_w19.onnx"
+NETWORK = ROOT / "sensor" / "models" / "bilstm_w19_ideal.onnx"
 VEHICLE = ROOT / "cosim" / "fmus" / "vehicle.fmi3.fmu"
 needs_vehicle = pytest.mark.skipif(not VEHICLE.is_file(), reason="the vehicle FMUs are not built")
 
@@ -277,7 +277,8 @@ def test_a_scenario(tmp_path: Path) -> None:
         "path": "driver.speed_kmh", "value": 90.0, "unit": "km/h", "origin": "given",
     }  # fmt: skip
     assert values["driver.style"]["origin"] == "default"
-    assert values["sensor.network"]["origin"] == "default"
+    assert values["sensor.estimator"]["value"] == "bilstm_w19"
+    assert values["sensor.condition"]["origin"] == "default"
     mass = values["vehicle.parameters.Body.Mass"]
     assert (mass["value"], mass["unit"], mass["origin"]) == (2600, "kg", "given")
     assert values["controllers.1.gain_ns_per_m"]["unit"] == "N s/m"
@@ -287,7 +288,7 @@ def test_a_scenario(tmp_path: Path) -> None:
     assert facts.data["expected_samples"] == pytest.approx(2001, rel=0.01)
     assert [run["name"] for run in facts.data["runs"]] == ["passive", "skyhook_estimate"]
     files = {f["what"]: f for f in facts.data["files"]}
-    assert set(files) >= {"scenario", "vehicle", "road", "network"}
+    assert set(files) >= {"scenario", "vehicle", "road", "sensor"}
     digest = hashlib.sha256(SCENARIO.encode()).hexdigest()
     assert files["scenario"]["sha256"] == digest
     out = typed_in(path).stdout

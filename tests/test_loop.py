@@ -18,7 +18,7 @@ from cosim.assembly import Assembly, assemble
 from cosim.cli import main
 from cosim.controller import SwitchingDampers, held
 from cosim.errors import FmuError
-from cosim.loop import Blocks, ControllerBlock, SensorBlock
+from cosim.loop import Blocks, ControllerBlock, MeasurementBlock, SensorBlock
 from cosim.loop import run as run_loop
 from cosim.recorder import Recorder, Signal
 from cosim.run import execute
@@ -40,15 +40,28 @@ CLOSED_LOOP = (
 class Counter:
     """All four blocks in one: every value tells of which sample it is."""
 
-    def __init__(self, last: int = 10_000, fails_at: int | None = None) -> None:
+    def __init__(self, last: int = 10_000, fails_at: int | None = None, error: float = 0.0) -> None:
         self.estimate: Array = np.full(4, np.nan)
+        self.error = error  # of every measured channel
         self.last, self.fails_at = last, fails_at
         self.calls: list[str] = []
         self.held: list[tuple[float, float]] = []
         self.told: list[float] = []
 
     def blocks(self) -> Blocks:
-        return Blocks(_CountingVehicle(self), _CountingDriver(self), self._sensor(), self._damper())
+        vehicle, driver = _CountingVehicle(self), _CountingDriver(self)
+        return Blocks(vehicle, driver, self._measurement(), self._sensor(), self._damper())
+
+    def _measurement(self) -> MeasurementBlock:
+        counter = self
+
+        class Measurement:
+            def step(self, channels: Array, stage: Array) -> Array:
+                counter.calls.append("measurement")
+                assert stage[0] == channels[0]
+                return channels + counter.error if counter.error else channels
+
+        return Measurement()
 
     def _sensor(self) -> SensorBlock:
         counter = self
@@ -75,7 +88,7 @@ class Counter:
             def step(self, measured: Array, estimate: Array, valid: bool, truth: Array) -> Array:
                 counter.calls.append("controller")
                 assert estimate[0] == 100 + measured[0]
-                assert truth[0] == -measured[0]
+                assert truth[0] == counter.error - measured[0]
                 assert valid == (measured[0] >= 2)
                 return np.full(4, 200 + measured[0])
 
@@ -115,12 +128,14 @@ class _CountingDriver:
 
 GROUPS = {
     "channels": 14, "estimate": 4, "valid": 1, "truth": 4, "command": 4, "driver": 3, "vehicle": 14,
+    "ideal": 0,
 }  # fmt: skip
 
 
-def recorder(rows: int) -> Recorder:
+def recorder(rows: int, ideal: int = 0) -> Recorder:
+    widths = {**GROUPS, "ideal": ideal}
     return Recorder(
-        [(name, [Signal(f"{name}{i}", "") for i in range(n)]) for name, n in GROUPS.items()], rows
+        [(name, [Signal(f"{name}{i}", "") for i in range(n)]) for name, n in widths.items()], rows
     )
 
 
@@ -136,6 +151,17 @@ def test_row_k_is_everything_at_t_k() -> None:
         for column in record.group(name).T:
             np.testing.assert_array_equal(column, values)
     np.testing.assert_array_equal(record.time, [i * 0.01 for i in range(6)])
+
+
+def test_what_is_measured_goes_to_sensor_controller_and_record() -> None:
+    record = recorder(6, ideal=14)
+    run_loop(Counter(error=0.5).blocks(), record, 5)
+    k = np.arange(6.0)
+    np.testing.assert_array_equal(record.group("channels")[:, 13], k + 0.5)
+    np.testing.assert_array_equal(record.group("estimate")[:, 0], 100.5 + k)
+    np.testing.assert_array_equal(record.group("command")[:, 0], 200.5 + k)
+    np.testing.assert_array_equal(record.group("ideal")[:, 13], k)
+    np.testing.assert_array_equal(record.group("truth")[:, 0], -k)
 
 
 def test_commands_of_row_k_are_held_from_k_on() -> None:
@@ -160,7 +186,10 @@ def test_the_vehicle_is_read_checked_and_stepped_once_a_sample() -> None:
     ]  # fmt: skip
     one = counter.calls[: counter.calls.index("step") + 1]
     assert one.index("sensor") < one.index("controller")
-    assert sorted(one) == ["check", "controller", "driver", "read", "sensor", "step"]
+    assert one.index("measurement") < one.index("sensor")
+    assert sorted(one) == [
+        "check", "controller", "driver", "measurement", "read", "sensor", "step",
+    ]  # fmt: skip
 
 
 def test_the_last_row_is_that_in_which_the_driver_arrives() -> None:
@@ -300,8 +329,8 @@ def test_estimates_count_from_the_first_full_window_on(tmp_path: Path) -> None:
     found = outcome.runs[0].figures
     assert found["valid_samples"] == record.rows - first
     errors = (estimate - truth)[first:]
-    assert found["network"]["overall"]["rmse_m_s"] == pytest.approx(np.sqrt(np.mean(errors**2)))
-    assert found["network"]["RL"]["rmse_m_s"] == pytest.approx(np.sqrt(np.mean(errors[:, 2] ** 2)))
+    assert found["sensor"]["overall"]["rmse_m_s"] == pytest.approx(np.sqrt(np.mean(errors**2)))
+    assert found["sensor"]["RL"]["rmse_m_s"] == pytest.approx(np.sqrt(np.mean(errors[:, 2] ** 2)))
     header, *rows = (tmp_path / "out" / "signals.csv").read_text().splitlines()
     column = header.split(",").index("VRel.FL [m/s]")
     written = [row.split(",")[column] for row in rows]
@@ -314,7 +343,7 @@ def test_a_sensor_that_is_never_valid_has_no_figures(tmp_path: Path) -> None:
     outcome = execute(scenario, tmp_path / "out", None, guessing)
     found = outcome.runs[0].figures
     assert found["valid_samples"] == 0
-    assert "network" not in found
+    assert "sensor" not in found
 
 
 # ---------------------------------------------------------------- the same scenario, the same bytes
@@ -410,8 +439,7 @@ def test_an_fmu_that_fails_ends_the_command_with_3(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = parrot_scenario(tmp_path, "Parrot.BadAt: 40, Parrot.BadOutput: 106")
-    monkeypatch.setattr("cosim.assembly.default_model", lambda: path)
-    monkeypatch.setattr("cosim.assembly.OnnxSensor", lambda file: Guess())
+    monkeypatch.setattr("cosim.assembly.estimator_of", lambda scenario: Guess())
     out = tmp_path / "out"
     result = CliRunner().invoke(main, ["run", str(path), "--output-dir", str(out)])
     assert result.exit_code == 3
@@ -430,7 +458,7 @@ def test_the_shipped_network_estimates_in_the_loop(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.stderr
     run = json.loads(result.stdout)["runs"]["passive"]
     assert run["valid_samples"] == 1501 - (WINDOW - 1)
-    assert run["network"]["overall"]["rmse_m_s"] < 0.7 * run["zero"]["overall"]["rmse_m_s"]
+    assert run["sensor"]["overall"]["rmse_m_s"] < 0.7 * run["zero"]["overall"]["rmse_m_s"]
     assert json.loads((out / "versions.json").read_text())["files"].keys() >= {
-        "scenario", "fmu", "network", "road",
+        "scenario", "fmu", "sensor", "road",
     }  # fmt: skip

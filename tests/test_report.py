@@ -15,7 +15,7 @@ SCENARIO = """\
 name: "<b>Lap</b> & more"
 road: {track: hockenheim}
 paper_row: Hockenheimring track, Normal driver
-limits: [{metric: network.overall.accuracy_percent, min: 80}, {metric: lap_time_s, max: 1}]
+limits: [{metric: sensor.overall.accuracy_percent, min: 80}, {metric: lap_time_s, max: 1}]
 """
 
 

@@ -68,7 +68,7 @@ def test_all_problems_at_once_each_at_its_place(tmp_path):
         "controllers:\n"
         "  - kind: skyhok\n"
         "limits:\n"
-        "  - {metric: network.overal.rmse_m_s, max: 1}\n",
+        "  - {metric: sensor.overal.rmse_m_s, max: 1}\n",
     )
     assert [(line, column) for line, column, _ in found] == [
         (2, 11),
@@ -88,7 +88,7 @@ def test_all_problems_at_once_each_at_its_place(tmp_path):
     assert "must be one finite number" in messages[4]
     assert "there is no file" in messages[5]
     assert messages[6].endswith("not 'skyhok'; did you mean 'skyhook'?")
-    assert messages[7].endswith("did you mean 'network.overall.rmse_m_s'?")
+    assert messages[7].endswith("did you mean 'sensor.overall.rmse_m_s'?")
 
 
 def test_a_field_in_the_wrong_section_is_sent_to_the_right_one(tmp_path):
@@ -320,7 +320,7 @@ def test_every_row_of_the_paper_has_its_scenario():
     )
     for scenario in scenarios:
         assert scenario.road.surface_name == "smooth"
-        regression = [x for x in scenario.limits if x.metric == "network.overall.rmse_m_s"]
+        regression = [x for x in scenario.limits if x.metric == "sensor.overall.rmse_m_s"]
         assert [limit.surface for limit in regression] == ["smooth", "A", "B"]
         assert len(scenario.limits) >= 5
 

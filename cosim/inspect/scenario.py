@@ -113,12 +113,10 @@ def _entry(where: str, item: Any, origin: str) -> Iterator[Value]:
 
 def _files(scenario: Scenario, fmu: Path, road: Path) -> list[dict[str, str]]:
     from cosim.provenance import sha256
-    from sensor import default_model
+    from cosim.sensor import estimator_file
 
-    name = scenario.sensor.network
-    network = Path(default_model()) if name == "default" else scenario.resolve(name)
     files: dict[str, Path | None] = {
-        "scenario": scenario.file, "vehicle": fmu, "road": road, "network": network,
+        "scenario": scenario.file, "vehicle": fmu, "road": road, "sensor": estimator_file(scenario),
         **{f"variant {n}": p for n, p in scenario.variants.files.items()},
     }  # fmt: skip
     return [

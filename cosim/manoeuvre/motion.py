@@ -46,6 +46,11 @@ class Motion:
 
 
 def motion_of(recorder: Recorder) -> Motion:
-    """Return the motion of a record with the groups channels and vehicle."""
-    names = ("Car.tx", "Car.ty", "Car.Yaw", "Car.vx", "Car.ay", "Car.YawRate", "Steer.WhlAng")
-    return Motion(recorder.time, *recorder.columns(names).T)
+    """Return the true motion of a record with the groups channels and vehicle, and with the group
+    ideal where the channels are measured with errors.
+    """
+    pose = ("Car.tx", "Car.ty", "Car.Yaw")
+    channels: tuple[str, ...] = ("Car.vx", "Car.ay", "Car.YawRate", "Steer.WhlAng")
+    recorded = {signal.name for signal in recorder.signals}
+    channels = tuple(f"Ideal.{n}" if f"Ideal.{n}" in recorded else n for n in channels)
+    return Motion(recorder.time, *recorder.columns((*pose, *channels)).T)

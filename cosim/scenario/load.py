@@ -22,7 +22,7 @@ from sensor.paper import paper_rows
 FILE_FIELDS: Final[tuple[tuple[Key, str | None, str, str], ...]] = (
     (("road", "file"), None, ".crg", "an OpenCRG road"),
     (("vehicle", "fmu"), "builtin", ".fmu", "an FMU"),
-    (("sensor", "network"), "default", ".onnx", "an ONNX network"),
+    (("sensor", "network"), None, ".onnx", "an ONNX network"),
 )
 
 

@@ -26,6 +26,7 @@ from cosim.scenario.limit import Limit
 from cosim.scenario.manoeuvre import Manoeuvre
 from cosim.scenario.model import Model, with_unit
 from cosim.scenario.road import Road
+from cosim.scenario.sensor import Sensor
 from cosim.scenario.source import Key, Source
 from cosim.scenario.variants import Value, Variants
 from cosim.scenario.vehicle import Vehicle
@@ -39,16 +40,6 @@ def _check_duration(value: object) -> object:
     if value == "lap" or (number and 0 < float(value) < float("inf")):  # type: ignore[arg-type]
         return value
     raise PydanticCustomError("duration", "must be 'lap' or a number of seconds greater than 0")
-
-
-class Sensor(Model):
-    """The virtual sensor."""
-
-    network: str = Field(
-        default="default",
-        min_length=1,
-        description="'default', or an ONNX file beside the scenario",
-    )
 
 
 class Output(Model):

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 CARD_FIGURES = ROOT / "build" / "figures.json"
 PAGE = ROOT / "docs" / "paper-scenarios.md"
 SURFACES = {"smooth": "smooth", "A": "class A", "B": "class B"}
-ESTIMATORS = ("network", "fir", "body_motion", "zero")
+ESTIMATORS = ("sensor", "fir", "body_motion", "zero")
 THETA0 = np.deg2rad(0.45)
 INTRODUCTION = """\
 # The paper's scenarios
@@ -135,11 +135,11 @@ def page(rows: list[Row], wall: float) -> str:
 def line(row: Row, paper: Any) -> str:
     """Return one row of a table of errors."""
     overall = {name: row.metrics[name].overall for name in ESTIMATORS}
-    shown = [error(overall[name]) for name in ("network", "fir")]
-    on_target = [100 * (1 - overall[e].rmse / row.projection_rms) for e in ("network", "zero")]
+    shown = [error(overall[name]) for name in ("sensor", "fir")]
+    on_target = [100 * (1 - overall[e].rmse / row.projection_rms) for e in ("sensor", "zero")]
     cells = [
         row.row,
-        f"{1e3 * overall['network'].truth_rms:.1f}",
+        f"{1e3 * overall['sensor'].truth_rms:.1f}",
         *shown,
         f"{on_target[0]:.1f}, {on_target[1]:.1f}",
         f"{1e3 * paper.truth_rms:.0f}",

@@ -38,7 +38,7 @@ def main() -> None:
             run = one.metrics["runs"]["passive"]
             truth = 1e3 * run["truth"]["overall"]["rms_m_s"]
             ride = run["comfort"]["weighted_acceleration_m_s2"]
-            cells = " | ".join(cell(run, name) for name in ("network", "fir", "body_motion"))
+            cells = " | ".join(cell(run, name) for name in ("sensor", "fir", "body_motion"))
             print(f"| `{one.job.scenario.stem}` | {truth:.0f} | {ride:.2f} | {cells} |")
 
 

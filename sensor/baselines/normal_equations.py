@@ -132,8 +132,9 @@ class NormalEquations:
         """
         penalty = np.full(len(self.gram), ridge * self.count)
         penalty[-1] = 0.0
-        solved: Array = np.linalg.solve(self.gram + np.diag(penalty), self.moment)
-        return solved
+        return np.asarray(
+            np.linalg.solve(self.gram + np.diag(penalty), self.moment), dtype=np.float64
+        )
 
     def rmse(self, weights: Array) -> Array:
         """Return the root mean square error (4,) [m/s] of weights (p, 4) on these windows."""

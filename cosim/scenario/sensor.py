@@ -1,0 +1,56 @@
+"""The virtual sensor of a scenario: which estimator, and how its channels are measured."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from cosim.errors import did_you_mean
+from cosim.scenario.model import Model
+from sensor.estimators import DEFAULT, names
+
+
+def _check_estimator(value: object) -> object:
+    if value is None or value in names():
+        return value
+    *others, last = names()
+    context = {
+        "choices": f"{', '.join(others)} or {last}",
+        "hint": did_you_mean(str(value), names()),
+    }
+    raise PydanticCustomError("estimator", "must be {choices}", context)
+
+
+class Sensor(Model):
+    """The virtual sensor: an estimator by name, or a network from a file."""
+
+    estimator: Annotated[str | None, BeforeValidator(_check_estimator)] = Field(
+        default=DEFAULT,
+        description="name of an estimator that is shipped (docs/estimators.md)",
+        json_schema_extra={"examples": list(names())},
+    )
+    network: str | None = Field(
+        default=None,
+        min_length=1,
+        description="instead of an estimator, an ONNX file relative to the scenario file",
+    )
+    condition: Literal["ideal", "production"] = Field(
+        default="ideal",
+        description="how the channels are measured: exactly, or by a car's sensors",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _network_instead(cls, data: Any) -> Any:
+        """A network stands in the default estimator's place, not beside it."""
+        if isinstance(data, dict) and data.get("network") is not None and "estimator" not in data:
+            return {**data, "estimator": None}
+        return data
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Sensor:
+        if (self.estimator is None) == (self.network is None):
+            raise PydanticCustomError("sensor", "give either an estimator or a network")
+        return self
