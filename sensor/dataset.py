@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sensor.channels import CHANNEL_NAMES, CHANNELS, COMMANDS, OUTPUT_NAMES, OUTPUTS, ROAD, STAGE
+from sensor.conditions import Condition, Measurement
 from sensor.errors import SensorError
 
 Float32 = npt.NDArray[np.float32]
@@ -49,6 +50,10 @@ class Run:
     truth: Float32
     road: Float32
     recipe: Mapping[str, Any] = field(default_factory=dict)
+
+    def measured(self, condition: Condition, seed: int) -> npt.NDArray[np.float64]:
+        """Return the 14 channels as a car measures them, (samples, 14): `sensor.conditions`."""
+        return Measurement(condition, seed).apply(self.channels, self.stage)
 
 
 def write_run(path: str | Path, run: Run) -> None:

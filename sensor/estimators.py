@@ -36,6 +36,12 @@ def _network(path: Path) -> "Estimator":
     return OnnxSensor(path)
 
 
+def _carried(path: Path) -> "Estimator":
+    from sensor.carried.runtime import CarriedSensor
+
+    return CarriedSensor(path)
+
+
 def _fir(path: Path) -> "Estimator":
     from sensor.baselines import FirFilter
 
@@ -63,6 +69,7 @@ _ESTIMATORS: Final[Mapping[str, Fitted | Callable[[Condition], "Estimator"]]] = 
     "fir_residual_w64": Fitted(".npz", _fir),
     "bilstm_w19": Fitted(".onnx", _network, ("ideal",)),
     "bilstm_residual_w19": Fitted(".onnx", _network),
+    "carried": Fitted(".onnx", _carried),
 }
 
 

@@ -5,7 +5,7 @@ thread.
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +18,17 @@ from sensor.window import Window
 __all__ = ["ModelInfo", "OnnxSensor", "SensorError"]
 
 METADATA_KEY = "sensor"
+CARRIED = "carried"
 BATCH = 1024
 
 
 @dataclass(frozen=True)
 class ModelInfo:
-    """What a network file says of itself: window [samples], sample rate [Hz], all metadata."""
+    """What a network file says of itself: its kind, window [samples] (1 for carried state), sample
+    rate [Hz], all metadata.
+    """
 
+    kind: Literal["windowed", "carried"]
     window: int
     sample_rate_hz: float
     metadata: dict[str, Any]
@@ -42,8 +46,9 @@ class OnnxSensor:
         """Open the file; raises SensorError if it is no network or its channels, units or rate are
         not this sensor's.
         """
-        self._session = _open(Path(model))
+        self._session = open_session(Path(model))
         self.info = read_info(self._session, str(model))
+        _check_window(self._session, self.info, str(model))
         self._window = Window(self.info.window)
         self._output = np.zeros((1, len(OUTPUTS)), dtype=np.float32)
         self._binding = self._bind()
@@ -99,7 +104,8 @@ class OnnxSensor:
         return binding
 
 
-def _open(path: Path) -> ort.InferenceSession:
+def open_session(path: Path) -> ort.InferenceSession:
+    """Open a network file on one thread; raises SensorError if it is none."""
     if not path.is_file():
         raise SensorError(f"{path}: there is no such network file.")
     options = ort.SessionOptions()
@@ -123,7 +129,10 @@ def read_info(session: ort.InferenceSession, source: str) -> ModelInfo:
     try:
         metadata = json.loads(text)
         inputs, outputs = metadata["inputs"], metadata["outputs"]
-        info = ModelInfo(int(metadata["window"]), float(metadata["sample_rate_hz"]), metadata)
+        rate = float(metadata["sample_rate_hz"])
+        carried = metadata.get("kind") == CARRIED
+        window = 1 if carried else int(metadata["window"])
+        info = ModelInfo("carried" if carried else "windowed", window, rate, metadata)
         named = [(part["names"], part["units"]) for part in (inputs, outputs)]
     except (ValueError, KeyError, TypeError) as error:
         raise SensorError(f"{source}: its metadata lacks or misspells {error}.") from error
@@ -133,9 +142,14 @@ def read_info(session: ort.InferenceSession, source: str) -> ModelInfo:
         raise SensorError(
             f"{source}: it expects {info.sample_rate_hz:g} Hz, where {SAMPLE_RATE_HZ} Hz belongs."
         )
+    return info
+
+
+def _check_window(session: ort.InferenceSession, info: ModelInfo, source: str) -> None:
+    if info.kind != "windowed":
+        raise SensorError(f"{source}: it carries a state, where a windowed network belongs.")
     shape = session.get_inputs()[0].shape
     if list(shape[1:]) != [info.window, len(CHANNELS)]:
         raise SensorError(
             f"{source}: its input is {shape}, but its metadata say window {info.window}."
         )
-    return info

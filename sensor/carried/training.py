@@ -1,0 +1,265 @@
+"""Training of the network with carried state: truncated backpropagation through time.
+
+Every random draw depends on (seed, epoch) alone, so a training resumed from its checkpoint ends in
+the same weights as one that was never interrupted.
+"""
+
+import json
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from sensor.carried.features import features
+from sensor.carried.network import SCALE, CarriedConfig, CarriedNetwork, State
+from sensor.carried.recipe import CarriedRecipe
+from sensor.carried.streams import Chunk, Sequence4, Streams
+from sensor.dataset import Run, read_runs
+from sensor.errors import SensorError
+from sensor.provenance import versions
+
+DEVIATION_SHARE = (
+    0.1  # of the deviation's loss beside the velocity's; it pulls at its own layer only
+)
+COVERAGE, SIGMAS = 0.90, 1.645  # of a normal distribution
+LARGEST_GRADIENT = 1.0
+
+
+@dataclass
+class Progression:
+    """What has been reached: a record per epoch and the best validation error (ratio)."""
+
+    epochs: list[dict[str, float]] = field(default_factory=list)
+    best: float = math.inf
+    best_epoch: int = 0
+    best_weights: dict[str, torch.Tensor] = field(default_factory=dict)
+
+
+def split(runs: Sequence[Run], hold_out: int) -> tuple[list[Run], list[Run]]:
+    """Return training and validation runs: of those sorted by name every `hold_out`-th is held
+    out.
+    """
+    ordered = sorted(runs, key=lambda run: run.name)
+    held = ordered[hold_out - 1 :: hold_out]
+    return [run for run in ordered if run not in held], held
+
+
+def train(
+    recipe: CarriedRecipe,
+    data: Path,
+    out: Path,
+    resume: bool,
+    progress: Callable[[int, int, str], None] = lambda done, total, text: None,
+) -> CarriedNetwork:
+    """Train by the recipe on the runs in `data`; write checkpoint, `training.json` and the ONNX
+    network to `out`; `progress` is told epochs done, of how many, and one line.
+
+    Raises SensorError if recipe, checkpoint and data do not fit.
+    """
+    from sensor.carried.graph import export_carried
+
+    runs = read_runs(data, recipe.runs)
+    out.mkdir(parents=True, exist_ok=True)
+    training, validation = split(runs, recipe.hold_out)
+    trainer = Trainer(recipe, training, validation)
+    if resume and (out / "checkpoint.pt").is_file():
+        trainer.load(out / "checkpoint.pt")
+    total = recipe.training.epochs
+    for epoch in range(len(trainer.reached.epochs), total):
+        trainer.run_epoch(epoch)
+        trainer.save(out / "checkpoint.pt")
+        (out / "training.json").write_text(json.dumps(trainer.record(), indent=1) + "\n", "utf-8")
+        progress(epoch + 1, total, trainer.summary())
+    network = trainer.finished()
+    (out / "training.json").write_text(json.dumps(trainer.record(), indent=1) + "\n", "utf-8")
+    export_carried(network, out / f"{recipe.name}.onnx", trainer.record())
+    return network
+
+
+class Trainer:
+    """One training in progress."""
+
+    def __init__(
+        self, recipe: CarriedRecipe, training: Sequence[Run], validation: Sequence[Run]
+    ) -> None:
+        torch.set_num_threads(recipe.training.threads)
+        torch.manual_seed(recipe.seed)
+        self.recipe, self.runs, self.held = recipe, training, validation
+        shape = recipe.network
+        self.network = CarriedNetwork(CarriedConfig(shape.front, shape.units, shape.hidden))
+        self.optimiser = torch.optim.Adam(
+            self.network.parameters(), lr=recipe.training.learning_rate
+        )
+        self.reached = Progression()
+        self._sequences = self._prepared(training, 0)
+        self._validation = self._prepared(validation, -1)
+        self._normalise()
+
+    def _prepared(self, runs: Sequence[Run], epoch: int) -> list[Sequence4]:
+        """Features of the runs as measured in this epoch."""
+        floor = self.recipe.training.weight_floor
+        prepared = []
+        for i, run in enumerate(runs):
+            seed = int(
+                np.random.SeedSequence([self.recipe.seed, epoch + 1, i]).generate_state(1)[0]
+            )
+            measured = run.measured(self.recipe.condition, seed)
+            square = float(np.mean(np.square(run.truth)))
+            weight = 1.0 / math.sqrt(square + floor**2) if floor else 1.0 / SCALE
+            prepared.append(Sequence4(features(measured, run.commands), run.truth, weight))
+        return prepared
+
+    def _normalise(self) -> None:
+        """Mean and deviation of the features over all training samples, run by run."""
+        count = sum(len(s.features) for s in self._sequences)
+        mean = sum(s.features.sum(axis=0, dtype=np.float64) for s in self._sequences) / count
+        square = sum(
+            np.square(s.features - mean).sum(axis=0, dtype=np.float64) for s in self._sequences
+        )
+        std = np.sqrt(square / count)
+        std[std < 1e-9] = 1.0
+        self.network.mean.copy_(torch.from_numpy(np.asarray(mean, dtype=np.float32)))
+        self.network.std.copy_(torch.from_numpy(np.asarray(std, dtype=np.float32)))
+
+    def run_epoch(self, epoch: int) -> None:
+        """Train one epoch, validate, keep the weights if they are the best so far."""
+        begin = time.perf_counter()
+        settings = self.recipe.training
+        if epoch and self.recipe.condition != "ideal":
+            self._sequences = self._prepared(self.runs, epoch)
+        random = np.random.default_rng([self.recipe.seed, epoch])
+        streams = Streams(settings.streams, settings.chunk, settings.warm_up)
+        chunks = list(streams.chunks(self._sequences, random))
+        squares, samples = 0.0, 0.0
+        state: State | None = None
+        self.network.train()
+        for number, chunk in enumerate(chunks):
+            self._set_rate((epoch + number / len(chunks)) / settings.epochs)
+            error, state = self._step(chunk, state)
+            squares, samples = squares + error, samples + 1
+        self._judge(epoch, math.sqrt(squares / samples), time.perf_counter() - begin)
+
+    def _step(self, chunk: Chunk, state: State | None) -> tuple[float, State]:
+        """One step of the optimiser; return the mean weighted square error and the next state."""
+        starts = torch.from_numpy(chunk.starts)[None, :, None]
+        if state is not None:
+            state = (state[0] * starts, state[1] * starts)
+        velocity, deviation, after = self.network(torch.from_numpy(chunk.features), state)
+        weight = torch.from_numpy(chunk.weight)
+        error = velocity - torch.from_numpy(chunk.truth)
+        square = (error * weight).square().mean()
+        likely = torch.log(deviation) + 0.5 * (error.detach() / deviation).square()
+        loss = square + DEVIATION_SHARE * (likely * (weight > 0)).mean()
+        self.optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), LARGEST_GRADIENT)
+        self.optimiser.step()
+        return float(square.detach()), (after[0].detach(), after[1].detach())
+
+    def _set_rate(self, progress: float) -> None:
+        rate = self.recipe.training.learning_rate * 0.5 * (1.0 + math.cos(math.pi * progress))
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate * min(1.0, 50.0 * progress * self.recipe.training.epochs / 10 + 0.05)
+
+    def _judge(self, epoch: int, training: float, seconds: float) -> None:
+        """Record the epoch and keep its weights if its error in validation is the least."""
+        validation = self.validate()
+        if not math.isfinite(validation):
+            raise SensorError(
+                f"the training diverged in epoch {epoch + 1}; lower the learning rate."
+            )
+        reached = self.reached
+        reached.epochs.append(
+            {
+                "epoch": epoch + 1,
+                "training_error": round(training, 5),
+                "validation_error": round(validation, 5),
+                "seconds": round(seconds, 1),
+            }
+        )
+        if validation < reached.best:
+            reached.best, reached.best_epoch = validation, epoch + 1
+            weights = self.network.state_dict()
+            reached.best_weights = {name: value.clone() for name, value in weights.items()}
+
+    @torch.no_grad()
+    def validate(self) -> float:
+        """Weighted error on the runs held out: rms over runs of rmse / sqrt(rms^2 + floor^2)."""
+        self.network.eval()
+        ratios = []
+        for sequence in self._validation:
+            error = self._estimate(sequence)[0] - sequence.truth
+            ratios.append(float(np.mean(np.square(error[self.recipe.training.warm_up :]))))
+            ratios[-1] *= sequence.weight**2
+        return math.sqrt(float(np.mean(ratios)))
+
+    @torch.no_grad()
+    def _estimate(self, sequence: Sequence4) -> tuple[Any, Any]:
+        velocity, deviation, _ = self.network(torch.from_numpy(sequence.features)[:, None])
+        return velocity[:, 0].numpy(), deviation[:, 0].numpy()
+
+    def finished(self) -> CarriedNetwork:
+        """Return the network of the best epoch, its deviation calibrated on the runs held out."""
+        self.network.load_state_dict(self.reached.best_weights)
+        self.network.eval()
+        self.network.calibration.fill_(1.0)
+        ratios = []
+        for sequence in self._validation:
+            velocity, deviation = self._estimate(sequence)
+            part = slice(self.recipe.training.warm_up, None)
+            ratios.append(np.abs(velocity - sequence.truth)[part] / deviation[part])
+        factor = np.quantile(np.concatenate(ratios), COVERAGE, axis=0) / SIGMAS
+        self.network.calibration.copy_(torch.from_numpy(factor.astype(np.float32)))
+        return self.network
+
+    def save(self, path: Path) -> None:
+        """Write the checkpoint, whole or not at all."""
+        temporary = path.with_suffix(".part")
+        torch.save(
+            {
+                "recipe": self.recipe.model_dump_json(),
+                "network": self.network.state_dict(),
+                "optimiser": self.optimiser.state_dict(),
+                "reached": asdict(self.reached),
+            },
+            temporary,
+        )
+        temporary.replace(path)
+
+    def load(self, path: Path) -> None:
+        """Go on from a checkpoint; raises SensorError if it belongs to another recipe."""
+        checkpoint = torch.load(path, weights_only=True)
+        if CarriedRecipe.model_validate_json(checkpoint["recipe"]) != self.recipe:
+            raise SensorError(f"{path}: the checkpoint was made by another recipe.")
+        self.network.load_state_dict(checkpoint["network"])
+        self.optimiser.load_state_dict(checkpoint["optimiser"])
+        self.reached = Progression(**checkpoint["reached"])
+
+    def summary(self) -> str:
+        """One line on the last epoch."""
+        last, reached = self.reached.epochs[-1], self.reached
+        return (
+            f"training {100 * last['training_error']:.2f} %, "
+            f"validation {100 * last['validation_error']:.2f} %, "
+            f"best {100 * reached.best:.2f} % (epoch {reached.best_epoch})"
+        )
+
+    def record(self) -> dict[str, Any]:
+        """What `training.json` and the network's metadata say of the training."""
+        return {
+            "recipe": self.recipe.model_dump(mode="json"),
+            "versions": versions(),
+            "samples": {
+                "training": sum(len(run.truth) for run in self.runs),
+                "validation": sum(len(run.truth) for run in self.held),
+                "validation_runs": [run.name for run in self.held],
+            },
+            "best_epoch": self.reached.best_epoch,
+            "best_validation_error": self.reached.best,
+            "epochs": self.reached.epochs,
+        }

@@ -1,0 +1,217 @@
+"""The network with carried state: features from first principles, the graph equal to torch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from sensor.carried.features import FeatureConfig, features, slow_mean, taken
+from sensor.carried.graph import export_carried
+from sensor.carried.network import CarriedConfig, CarriedNetwork
+from sensor.carried.recipe import CarriedRecipe, Schedule, Shape
+from sensor.carried.runtime import CarriedSensor
+from sensor.carried.streams import Sequence4, Streams
+from sensor.carried.training import Trainer, split
+from sensor.channels import CHANNEL_NAMES
+from sensor.dataset import Run
+from sensor.errors import SensorError
+from sensor.features import WHEEL_SPEEDS
+
+VX = CHANNEL_NAMES.index("Car.vx")
+AZ = CHANNEL_NAMES.index("Car.az")
+
+
+def drive(samples: int, seed: int = 1, speed: float = 15.0) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(seed)
+    channels = random.normal(scale=0.2, size=(samples, 14))
+    channels[:, [3, 4, 5, 7, 8, 13]] *= 0.1
+    channels[:, VX] = speed
+    channels[:, WHEEL_SPEEDS] = speed + random.normal(scale=0.02, size=(samples, 4))
+    return channels, random.uniform(size=(samples, 4))
+
+
+def small() -> CarriedNetwork:
+    torch.manual_seed(3)
+    network = CarriedNetwork(CarriedConfig(front=8, units=12, hidden=6))
+    network.mean.uniform_(-0.1, 0.1)
+    network.std.uniform_(0.5, 2.0)
+    network.calibration.uniform_(0.5, 1.5)
+    return network.eval()
+
+
+def column(name: str) -> int:
+    return FeatureConfig().names.index(name)
+
+
+def test_an_impulse_at_the_front_comes_back_one_wheelbase_later() -> None:
+    channels, commands = np.zeros((200, 14)), np.zeros((200, 4))
+    channels[:, VX] = speed = 10.0
+    channels[:, WHEEL_SPEEDS] = speed
+    channels[50, AZ] = 1.0
+    rows = features(channels, commands, FeatureConfig(bias_time=100.0))
+    delay = 2.675 / speed * 100.0  # samples
+    for lead in (0, 4):
+        heard = rows[:, column(f"az@{lead:+d}")]
+        loud = np.flatnonzero(np.abs(heard) > 0.2)
+        centre = (heard[loud] * loud).sum() / heard[loud].sum()
+        assert centre == pytest.approx(50 + delay - lead, abs=0.02)
+
+
+def test_slow_errors_of_wheels_and_imu_vanish() -> None:
+    channels, commands = drive(6000)
+    worn = channels.copy()
+    worn[:, WHEEL_SPEEDS[0]] *= 1.004  # a wheel 0.4 % too small
+    worn[:, AZ] += 0.5
+    difference = (features(worn, commands) - features(channels, commands))[-1000:]
+    assert np.abs(difference[:, column("Residual.FL")]).max() < 0.002  # of 60 mm/s
+    assert np.abs(difference[:, column("az")]).max() < 0.01
+
+
+def test_slow_mean_starts_as_the_mean_of_all() -> None:
+    x = np.arange(10.0)[:, None]
+    assert slow_mean(x, 100)[:, 0] == pytest.approx(x[:, 0] / 2)
+    assert slow_mean(np.ones((5000, 1)), 50)[-1, 0] == pytest.approx(1.0)
+
+
+def test_age_between_samples() -> None:
+    source = np.arange(1.0, 11.0)[:, None]
+    assert taken(source, np.full(10, 2.5))[:, 0] == pytest.approx(
+        [0, 0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]
+    )
+
+
+def test_the_graph_streams_what_torch_computes(tmp_path: Path) -> None:
+    network = small()
+    sensor = CarriedSensor(export_carried(network, tmp_path / "n.onnx"))
+    channels, commands = drive(300)
+    channels[:, VX] = np.linspace(0.0, 40.0, 300)
+    channels[:, WHEEL_SPEEDS] = channels[:, [VX]]
+    got, deviation = sensor.apply_with_deviation(channels, commands)
+    with torch.no_grad():
+        want, spread, _ = network(torch.from_numpy(features(channels, commands))[:, None])
+    assert np.isnan(got[: sensor.warm_up]).all()
+    first = sensor.warm_up
+    assert got[first:] == pytest.approx(want[first:, 0].numpy(), abs=1e-5)
+    assert deviation[first:] == pytest.approx(spread[first:, 0].numpy(), abs=1e-5)
+
+
+def test_reset_forgets_and_steps_are_deterministic(tmp_path: Path) -> None:
+    sensor = CarriedSensor(export_carried(small(), tmp_path / "n.onnx"))
+    channels, commands = drive(80)
+    first = sensor.apply(channels, commands)
+    for k in range(30):
+        sensor.step(channels[k], commands[k])
+    sensor.reset()
+    assert np.isnan(sensor.estimate).all()
+    assert np.array_equal(sensor.apply(channels, commands), first, equal_nan=True)
+
+
+def test_a_bad_sample_is_refused_and_not_taken(tmp_path: Path) -> None:
+    sensor = CarriedSensor(export_carried(small(), tmp_path / "n.onnx"))
+    channels, commands = drive(60)
+    want = sensor.apply(channels, commands)
+    for k in range(60):
+        if k == 40:
+            bad = channels[k].copy()
+            bad[AZ] = np.nan
+            with pytest.raises(SensorError, match=r"Car\.az is nan"):
+                sensor.step(bad, commands[k])
+        sensor.step(channels[k], commands[k])
+    assert np.array_equal(sensor.estimate, want[-1])
+
+
+def test_a_wrong_graph_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sensor.carried import graph
+
+    monkeypatch.setattr(graph, "_TORCH_TO_ONNX_GATES", [0, 1, 2, 3])
+    with pytest.raises(SensorError, match="differ"):
+        export_carried(small(), tmp_path / "n.onnx")
+    assert not list(tmp_path.iterdir())
+
+
+def test_streams_play_every_run_once_from_its_start() -> None:
+    random = np.random.default_rng(0)
+    runs = [
+        Sequence4(np.full((n, 3), i, dtype=np.float32), np.full((n, 4), i, dtype=np.float32), 1.0)
+        for i, n in enumerate((250, 90, 420, 130, 333))
+    ]
+    seen = np.zeros(len(runs))
+    for chunk in Streams(count=3, chunk=50, warm_up=10).chunks(runs, random):
+        assert np.array_equal(chunk.features[..., 0], chunk.truth[..., 0])
+        for stream in range(3):
+            counted = chunk.weight[:, stream, 0] > 0
+            for index in np.unique(chunk.truth[counted, stream, 0]):
+                seen[int(index)] += counted.sum()
+    assert list(seen) == [240, 80, 410, 120, 323]
+
+
+def runs_of_a_known_plant(count: int, samples: int) -> list[Run]:
+    """v_rel of every wheel is a low-pass of a_z: what a state must be carried for."""
+    runs = []
+    for seed in range(count):
+        channels, commands = drive(samples, seed)
+        velocity = np.zeros(samples)
+        for k in range(1, samples):
+            velocity[k] = 0.9 * velocity[k - 1] + 0.1 * channels[k, AZ]
+        truth = np.repeat(velocity[:, None], 4, axis=1)
+        parts = (channels, np.zeros((samples, 11)), commands, truth, np.zeros((samples, 4)))
+        runs.append(Run(f"run_{seed:02d}", *(part.astype(np.float32) for part in parts)))
+    return runs
+
+
+def recipe(epochs: int) -> CarriedRecipe:
+    return CarriedRecipe(
+        family="carried", name="test", condition="ideal", hold_out=4,
+        network=Shape(front=8, units=12, hidden=8),
+        training=Schedule(epochs=epochs, streams=4, chunk=25, learning_rate=2e-2),
+    )  # fmt: skip
+
+
+def test_training_learns_and_resumes_to_the_same_weights(tmp_path: Path) -> None:
+    training, held = split(runs_of_a_known_plant(12, 400), 4)
+    assert [run.name for run in held] == ["run_03", "run_07", "run_11"]
+    whole = Trainer(recipe(6), training, held)
+    first = Trainer(recipe(6), training, held)
+    for epoch in range(6):
+        whole.run_epoch(epoch)
+        if epoch < 3:
+            first.run_epoch(epoch)
+    first.save(tmp_path / "checkpoint.pt")
+    second = Trainer(recipe(6), training, held)
+    second.load(tmp_path / "checkpoint.pt")
+    for epoch in range(3, 6):
+        second.run_epoch(epoch)
+    assert whole.reached.best < 0.7 * whole.reached.epochs[0]["validation_error"]
+    for name, weights in whole.network.state_dict().items():
+        assert torch.equal(weights, second.network.state_dict()[name]), name
+
+
+def test_the_deviation_covers_ninety_percent_of_the_runs_held_out() -> None:
+    training, held = split(runs_of_a_known_plant(12, 400), 4)
+    trainer = Trainer(recipe(3), training, held)
+    for epoch in range(3):
+        trainer.run_epoch(epoch)
+    network = trainer.finished()
+    inside = []
+    for run in held:
+        with torch.no_grad():
+            rows = torch.from_numpy(features(run.channels, run.commands))[:, None]
+            velocity, deviation, _ = network(rows)
+        error = np.abs(velocity[:, 0].numpy() - run.truth)[20:]
+        inside.append(error < 1.645 * deviation[:, 0].numpy()[20:])
+    assert np.concatenate(inside).mean() == pytest.approx(0.90, abs=0.01)
+
+
+def test_a_checkpoint_of_another_recipe_is_refused(tmp_path: Path) -> None:
+    training, held = split(runs_of_a_known_plant(4, 200), 4)
+    Trainer(recipe(2), training, held).save(tmp_path / "c.pt")
+    with pytest.raises(SensorError, match="another recipe"):
+        Trainer(recipe(3), training, held).load(tmp_path / "c.pt")
+
+
+def test_the_network_stays_within_a_tenth_of_the_windowed_work() -> None:
+    windowed = 19 * 4 * 167 * (14 + 167) + 3 * 14 * 167 + 334 * 256 + 256 * 4
+    assert CarriedConfig().products <= windowed / 10
