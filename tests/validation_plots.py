@@ -26,11 +26,7 @@ def log_bands(f: Array, power: Array, low: float, high: float, count: int = 120)
     return np.array([f[place == k].mean() for k in used]), values
 
 
-STYLE = {
-    "svg.hashsalt": "suspension-cosim", "font.size": 9.0, "axes.grid": True, "grid.alpha": 0.3,
-    "axes.spines.top": False, "axes.spines.right": False, "lines.linewidth": 1.3,
-    "legend.frameon": False, "axes.titlesize": 10.0, "figure.constrained_layout.use": True,
-}  # fmt: skip
+STYLE = Path(__file__).parents[1] / "docs" / "measure" / "plots.mplstyle"
 
 
 @contextmanager
@@ -44,7 +40,7 @@ def picture(
     import matplotlib.pyplot as plt
 
     assert section in SECTIONS, section
-    with plt.rc_context(STYLE):
+    with plt.style.context(STYLE):
         figure, axes = plt.subplots(**layout)
         yield figure, axes
         figure.savefig(folder / f"{file}.svg", metadata={"Date": None, "Creator": None})
