@@ -19,8 +19,13 @@ class _Part(BaseModel):
 
 
 class NetworkRecipe(_Part):
-    """Shape of the network; the defaults are the paper's."""
+    """Shape of the network; the defaults are the paper's.
 
+    `channels` says what stands in the places of the four wheel speeds: the speeds (`raw`) or their
+    residuals (`residual`, see `sensor.features`).
+    """
+
+    channels: Literal["raw", "residual"] = "raw"
     window: int = Field(default=19, ge=1)
     units: int = Field(default=167, ge=1)
     hidden: int = Field(default=256, ge=1)
@@ -62,11 +67,16 @@ class RunSelection(_Part):
 
 
 class Recipe(_Part):
-    """A whole recipe; `seed` decides the initial weights, the windows of each epoch and the
-    dropout.
+    """A whole recipe of a windowed network.
+
+    `seed` decides the initial weights, the windows of each epoch, the dropout and the measurement
+    errors; `condition` what the network is shown, the ideal channels or what production parts
+    measure.
     """
 
     name: str
+    family: Literal["bilstm"] = "bilstm"
+    condition: Literal["ideal", "production"] = "ideal"
     seed: int = Field(default=1, ge=0)
     network: NetworkRecipe = NetworkRecipe()
     training: TrainingRecipe = TrainingRecipe()

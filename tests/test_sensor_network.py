@@ -149,3 +149,23 @@ def test_a_wrong_graph_is_never_written(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(SensorError, match="not written"):
         export_windowed(network, tmp_path / "net.onnx")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("units", [13, 16])
+def test_bfloat16_gives_the_same_output_and_gradients_to_its_precision(units: int) -> None:
+    network = make_network(NetworkConfig(window=7, units=units, hidden=32, dropout=0.0))
+    windows = torch.randn(64, 7, 14)
+
+    def gradients(bf16: bool) -> dict[str, torch.Tensor]:
+        network.zero_grad()
+        with torch.autocast("cpu", torch.bfloat16, enabled=bf16):
+            estimate = network.standardised(windows)
+        estimate.float().square().mean().backward()
+        return {
+            name: p.grad.clone() for name, p in network.named_parameters() if p.grad is not None
+        }
+
+    exact, rounded = gradients(False), gradients(True)
+    assert len(exact) == 10
+    for name, gradient in exact.items():
+        assert (rounded[name] - gradient).norm() < 0.03 * gradient.norm(), name

@@ -116,7 +116,7 @@ def test_command_reports_every_problem_and_exits_with_2(tmp_path: Path) -> None:
 def test_the_papers_recipe() -> None:
     recipe = read_recipe(RECIPES / "paper.yaml")
     assert recipe.network.model_dump() == {
-        "window": 19, "units": 167, "hidden": 256, "dropout": 0.5,
+        "channels": "raw", "window": 19, "units": 167, "hidden": 256, "dropout": 0.5,
     }  # fmt: skip
     assert (recipe.training.epochs, recipe.training.learning_rate) == (30, 1e-3)
     assert recipe.training.schedule == "cosine"  # docs/decisions/0004-training-schedule.md
