@@ -178,6 +178,7 @@ class WindowSet:
             raise SensorError(
                 f"a window needs {window} samples of a run: {', '.join(short) or 'no run'}."
             )
+        self.normalisation = normalisation
         total = sum(len(run.channels) for run in runs)
         self.channels = np.empty((total, len(CHANNEL_NAMES)), dtype=np.float32)
         self.truth = np.empty((total, len(OUTPUT_NAMES)), dtype=np.float32)

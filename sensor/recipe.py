@@ -3,9 +3,9 @@ read strictly.
 """
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -16,6 +16,9 @@ RECIPES = Path(__file__).parent / "recipes"
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+_P = TypeVar("_P", bound=_Part)
 
 
 class NetworkRecipe(_Part):
@@ -84,11 +87,85 @@ class Recipe(_Part):
     runs: RunSelection
 
 
+class Span(_Part):
+    """Whole numbers from `least` to `most`, both included."""
+
+    least: int = Field(default=1, ge=1)
+    most: int = Field(default=512, ge=1)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.least > self.most:
+            raise ValueError(f"least is {self.least}, above most, {self.most}")
+        return self
+
+
+class EarlyStop(_Part):
+    """A trial stops after an epoch, the `after`-th or a later one, in which its validation RMSE is
+    `behind` (relative) above the median that finished trials of its window had there.
+    """
+
+    after: int = Field(ge=1)
+    behind: float = Field(default=0.1, ge=0.0)
+
+
+class SearchRecipe(_Part):
+    """A search over the units of LSTM and dense layer, for each window size by itself.
+
+    Each window gets `trials` trainings by `training`, the first `startup` spread evenly, the others
+    where the Gaussian process expects most. `seed` decides all random draws of the sampler and the
+    trainings.
+    """
+
+    name: str
+    condition: Literal["ideal", "production"] = "ideal"
+    seed: int = Field(default=1, ge=0)
+    channels: Literal["raw", "residual"] = "raw"
+    windows: tuple[int, ...] = Field(min_length=1)
+    units: Span = Span()
+    hidden: Span = Span()
+    dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
+    trials: int = Field(ge=1)
+    startup: int = Field(ge=2)
+    stop: EarlyStop | None = None
+    training: TrainingRecipe
+    runs: RunSelection
+
+    def trial(self, window: int, units: int, hidden: int) -> Recipe:
+        """Return the recipe of one trial."""
+        network = NetworkRecipe(
+            channels=self.channels,
+            window=window,
+            units=units,
+            hidden=hidden,
+            dropout=self.dropout,
+        )
+        return Recipe(
+            name=f"{self.name}_w{window}",
+            condition=self.condition,
+            seed=self.seed,
+            network=network,
+            training=self.training,
+            runs=self.runs,
+        )
+
+
 def read_recipe(path: str | Path) -> Recipe:
-    """Read a recipe; raises SensorError with one sentence for each entry that does not fit."""
+    """Read a training's recipe; raises SensorError with one sentence for each entry that does not
+    fit.
+    """
+    return _read(path, Recipe)
+
+
+def read_search_recipe(path: str | Path) -> SearchRecipe:
+    """Read a search's recipe; raises as `read_recipe` does."""
+    return _read(path, SearchRecipe)
+
+
+def _read(path: str | Path, kind: type[_P]) -> _P:
     try:
         content = YAML(typ="safe").load(Path(path))
-        return Recipe.model_validate(content)
+        return kind.model_validate(content)
     except OSError as error:
         raise SensorError(f"{path}: it cannot be read: {error.strerror}.") from error
     except YAMLError as error:

@@ -63,21 +63,8 @@ def fit(
     recipe: Recipe, training: Sequence[Run], validation: Sequence[Run], out: Path, *, resume: bool
 ) -> tuple[BiLstmNetwork, dict[str, Any]]:
     """Train on runs already read; return the network of the best epoch and the training record."""
-    torch.set_num_threads(recipe.training.threads)
-    torch.manual_seed(recipe.seed)
-    normalisation = Normalisation.of(training)
-    shape = recipe.network
-    network = BiLstmNetwork(
-        NetworkConfig(shape.window, units=shape.units, hidden=shape.hidden, dropout=shape.dropout)
-    )
-    for name, values in asdict(normalisation).items():
-        getattr(network, name).copy_(torch.from_numpy(values))
-    trainer = Trainer(
-        recipe,
-        network,
-        WindowSet(training, shape.window, normalisation),
-        WindowSet(validation, shape.window, normalisation),
-    )
+    trainer = Trainer.of(recipe, *window_sets(recipe, training, validation))
+    network = trainer.network
     if resume:
         trainer.load(out / "checkpoint.pt")
     description = _describe(recipe, training, validation)
@@ -93,8 +80,32 @@ def fit(
     return network.eval(), description | trainer.record()
 
 
+def window_sets(
+    recipe: Recipe, training: Sequence[Run], validation: Sequence[Run]
+) -> tuple[WindowSet, WindowSet]:
+    """Return the training and the validation windows, both standardised by the training runs."""
+    normalisation = Normalisation.of(training)
+    window = recipe.network.window
+    return WindowSet(training, window, normalisation), WindowSet(validation, window, normalisation)
+
+
 class Trainer:
     """One training in progress: network, optimiser and what has been reached."""
+
+    @classmethod
+    def of(cls, recipe: Recipe, training: WindowSet, validation: WindowSet) -> "Trainer":
+        """Begin a training with the initial weights that the recipe's seed gives."""
+        torch.set_num_threads(recipe.training.threads)
+        torch.manual_seed(recipe.seed)
+        shape = recipe.network
+        network = BiLstmNetwork(
+            NetworkConfig(
+                shape.window, units=shape.units, hidden=shape.hidden, dropout=shape.dropout
+            )
+        )
+        for name, values in asdict(training.normalisation).items():
+            getattr(network, name).copy_(torch.from_numpy(values))
+        return cls(recipe, network, training, validation)
 
     def __init__(
         self, recipe: Recipe, network: BiLstmNetwork, training: WindowSet, validation: WindowSet

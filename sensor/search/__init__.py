@@ -1,0 +1,1 @@
+"""The Bayesian search over the network's shape: studies, trials, results."""
