@@ -20,12 +20,19 @@ from onnx import TensorProto, helper, numpy_helper
 
 from sensor.channels import CHANNEL_NAMES, CHANNEL_UNITS, OUTPUT_NAMES, OUTPUT_UNITS, SAMPLE_RATE_HZ
 from sensor.errors import SensorError
+from sensor.features import WHEEL_SPEEDS
 from sensor.network import TAP, BiLstmNetwork
+from sensor.residual_matrices import ResidualMatrices
 from sensor.runtime import METADATA_KEY
 
 OPSET = 17
 IR_VERSION = 8
 TOLERANCE = 1e-5
+RAW = "the channels as they are"
+RESIDUAL = (
+    "the graph takes from the wheel speeds what driving explains before it standardises; mean and "
+    "deviation at their places are those of these residuals"
+)
 _TORCH_TO_ONNX_GATES = [0, 3, 1, 2]  # input, forget, cell, output -> input, output, forget, cell
 
 Float32 = npt.NDArray[np.float32]
@@ -53,7 +60,10 @@ def build_windowed(
     """Build the windowed graph with explicit normalisation nodes and metadata."""
     config = network.config
     nodes = [
-        helper.make_node("Sub", ["measured", "input_mean"], ["centred"]),
+        *(_residuals() if config.residual else []),
+        helper.make_node(
+            "Sub", ["seen" if config.residual else "measured", "input_mean"], ["centred"]
+        ),
         helper.make_node("Div", ["centred", "input_std"], ["standardised"]),
         helper.make_node("Transpose", ["standardised"], ["time_major"], perm=[1, 0, 2]),
         helper.make_node(
@@ -98,6 +108,33 @@ def build_windowed(
     return model
 
 
+def _residuals() -> list[onnx.NodeProto]:
+    """Replace the wheel speeds by their residuals, see `sensor.residual_matrices`."""
+    return [
+        helper.make_node("Cast", ["measured"], ["sample"], to=TensorProto.DOUBLE),
+        helper.make_node("MatMul", ["sample", "wheels"], ["wheel_speed"]),
+        helper.make_node("MatMul", ["sample", "driving"], ["driving_speed"]),
+        helper.make_node("MatMul", ["sample", "steering"], ["steer_angle"]),
+        helper.make_node("MatMul", ["sample", "slip"], ["driving_slip"]),
+        helper.make_node("Cos", ["steer_angle"], ["steer_cosine"]),
+        helper.make_node("Div", ["driving_speed", "steer_cosine"], ["rolling_speed"]),
+        helper.make_node("Add", ["driving_slip", "rolling"], ["wheel_per_rolling"]),
+        helper.make_node("Mul", ["rolling_speed", "wheel_per_rolling"], ["driven_speed"]),
+        helper.make_node("Sub", ["wheel_speed", "driven_speed"], ["unbounded_residual"]),
+        helper.make_node("Clip", ["unbounded_residual", "lowest", "highest"], ["residual"]),
+        helper.make_node("MatMul", ["residual", "spread"], ["residual_in_place"]),
+        helper.make_node("Mul", ["sample", "others"], ["other_channels"]),
+        helper.make_node("Add", ["other_channels", "residual_in_place"], ["features_seen"]),
+        helper.make_node("Cast", ["features_seen"], ["seen"], to=TensorProto.FLOAT),
+    ]
+
+
+def _residual_constants() -> dict[str, npt.NDArray[Any]]:
+    matrices = vars(ResidualMatrices.of())
+    limit = np.array(matrices.pop("limit"))
+    return matrices | {"lowest": -limit, "highest": limit}
+
+
 def _cell() -> list[onnx.NodeProto]:
     """One LSTM cell from zero state: output gate * tanh(input gate * tanh(candidate))."""
     return [
@@ -131,6 +168,8 @@ def _weights(network: BiLstmNetwork) -> list[onnx.TensorProto]:
     arrays |= {
         name: state[name] for name in ("input_mean", "input_std", "output_mean", "output_std")
     }
+    if network.config.residual:
+        arrays |= _residual_constants()
     return [
         numpy_helper.from_array(np.asarray(array, order="C"), name)
         for name, array in arrays.items()
@@ -161,6 +200,7 @@ def metadata(network: BiLstmNetwork, training: dict[str, Any] | None = None) -> 
             "mean": network.output_mean.tolist(),
             "std": network.output_std.tolist(),
         },
+        "features": RESIDUAL if network.config.residual else RAW,
         "network": {"units": network.config.units, "hidden": network.config.hidden},
         "tap": TAP,
         "training": training or {},
@@ -173,9 +213,7 @@ def verify(model: onnx.ModelProto, network: BiLstmNetwork, windows: int = 64) ->
 
     Raises SensorError if it exceeds 1e-5 m/s.
     """
-    config = network.config
-    noise = np.random.default_rng(0).normal(size=(windows, config.window, config.channels))
-    measured = (noise * network.input_std.numpy() + network.input_mean.numpy()).astype(np.float32)
+    measured = _random_windows(network, windows)
     was_training = network.training
     network.eval()
     with torch.no_grad():
@@ -190,3 +228,13 @@ def verify(model: onnx.ModelProto, network: BiLstmNetwork, windows: int = 64) ->
             f"not written: ONNX Runtime is {difference:.3g} m/s off torch (limit {TOLERANCE:g})."
         )
     return difference
+
+
+def _random_windows(network: BiLstmNetwork, count: int) -> Float32:
+    """Draw windows (count, W, 14) of the training data's spread, in SI units."""
+    config = network.config
+    noise = np.random.default_rng(0).normal(size=(count, config.window, config.channels))
+    measured = noise * network.input_std.numpy() + network.input_mean.numpy()
+    if config.residual:  # mean and deviation there are those of residuals
+        measured[..., WHEEL_SPEEDS] += ResidualMatrices.of().driven(measured)
+    return np.asarray(measured, dtype=np.float32)

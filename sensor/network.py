@@ -20,6 +20,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from sensor.residual_matrices import ResidualMatrices
+
 TAP = (
     "BiLSTM output at the last sample of the window; the backward direction is one cell evaluation "
     "from zero state, which is exact for this tap only"
@@ -30,7 +32,11 @@ _BLOCK = 8
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Shape of the network; the defaults are the paper's."""
+    """Shape of the network; the defaults are the paper's.
+
+    With `residual` the network itself replaces the four wheel speeds by their residuals
+    (`sensor.features`) before it standardises.
+    """
 
     window: int = 19
     channels: int = 14
@@ -38,6 +44,7 @@ class NetworkConfig:
     hidden: int = 256
     outputs: int = 4
     dropout: float = 0.5
+    residual: bool = False
 
 
 class BiLstmNetwork(nn.Module):
@@ -79,7 +86,8 @@ class BiLstmNetwork(nn.Module):
 
     def forward(self, measured: Tensor) -> Tensor:
         """Map windows (batch, W, 14) in the channels' units to velocities (batch, 4) in m/s."""
-        standardised = self.standardised((measured - self.input_mean) / self.input_std)
+        seen = with_residuals(measured) if self.config.residual else measured
+        standardised = self.standardised((seen - self.input_mean) / self.input_std)
         return standardised * self.output_std + self.output_mean
 
     def standardised(self, windows: Tensor) -> Tensor:
@@ -130,3 +138,24 @@ class BiLstmNetwork(nn.Module):
         bias = bias.reshape(4, self.config.units)
         self.backward_cell.weight.copy_(weight[keep].flatten(0, 1))
         self.backward_cell.bias.copy_(bias[keep].flatten())
+
+
+def with_residuals(measured: Tensor) -> Tensor:
+    """Return measured windows (batch, W, 14) with the wheel speeds replaced by their residuals."""
+    matrices = ResidualMatrices.of()
+    wheels, driving, steering, slip, rolling, spread, others = (
+        torch.from_numpy(matrix)
+        for matrix in (
+            matrices.wheels,
+            matrices.driving,
+            matrices.steering,
+            matrices.slip,
+            matrices.rolling,
+            matrices.spread,
+            matrices.others,
+        )
+    )
+    x = measured.double()
+    driven = (x @ driving) / torch.cos(x @ steering) * (x @ slip + rolling)
+    residual = (x @ wheels - driven).clamp(-matrices.limit, matrices.limit)
+    return (x * others + residual @ spread).to(measured.dtype)

@@ -63,10 +63,20 @@ class FirRecipe(_Part):
 
 
 class RunSelection(_Part):
-    """File stems of the runs as glob patterns, by part; each must match at least one file."""
+    """File stems of the runs as glob patterns, by part; each must match at least one file.
+
+    Validation runs are named, or are every `hold_out`-th of the training's, sorted by name.
+    """
 
     training: tuple[str, ...] = Field(min_length=1)
-    validation: tuple[str, ...] = Field(min_length=1)
+    validation: tuple[str, ...] = ()
+    hold_out: int | None = Field(default=None, ge=2)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if bool(self.validation) == (self.hold_out is not None):
+            raise ValueError("validation runs are either named (validation) or held out (hold_out)")
+        return self
 
 
 class Recipe(_Part):

@@ -9,7 +9,7 @@ import json
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +19,13 @@ import torch
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from sensor.conditions import Measurement
 from sensor.dataset import Normalisation, Run, WindowSet, read_runs
 from sensor.errors import SensorError
+from sensor.features import with_residuals
 from sensor.network import BiLstmNetwork, NetworkConfig
 from sensor.provenance import versions
-from sensor.recipe import Recipe, TrainingRecipe, read_recipe
+from sensor.recipe import Recipe, RunSelection, TrainingRecipe, read_recipe
 
 _VALIDATION_BATCH = 2048
 
@@ -49,9 +51,7 @@ def train(data: Path, recipe_path: Path, out: Path, *, resume: bool = False) -> 
     from sensor.export import export_windowed
 
     recipe = read_recipe(recipe_path)
-    training, validation = (
-        read_runs(data, patterns) for patterns in (recipe.runs.training, recipe.runs.validation)
-    )
+    training, validation = read_parts(data, recipe.runs)
     out.mkdir(parents=True, exist_ok=True)
     network, record = fit(recipe, training, validation, out, resume=resume)
     window = recipe.network.window
@@ -72,6 +72,12 @@ def fit(
         task = progress.add_task("epoch", total=recipe.training.epochs)
         for epoch in range(len(trainer.reached.epochs), recipe.training.epochs):
             progress.update(task, completed=epoch, description=trainer.summary())
+            if epoch and recipe.condition != "ideal":  # offsets and gains: other ones every epoch
+                trainer.training = WindowSet(
+                    as_seen(recipe, training, draw=epoch),
+                    recipe.network.window,
+                    trainer.training.normalisation,
+                )
             trainer.run_epoch(epoch)
             trainer.save(out / "checkpoint.pt")
             _write_json(out / "training.json", description | trainer.record())
@@ -80,13 +86,44 @@ def fit(
     return network.eval(), description | trainer.record()
 
 
+def read_parts(data: Path, selection: RunSelection) -> tuple[list[Run], list[Run]]:
+    """Read the training and the validation runs; raises SensorError if files are missing."""
+    training = read_runs(data, selection.training)
+    if selection.hold_out is None:
+        return training, read_runs(data, selection.validation)
+    step = selection.hold_out
+    if len(training) < step:
+        raise SensorError(
+            f"{data}: of {step} runs one is held out for validation, but there are {len(training)}."
+        )
+    return [run for i, run in enumerate(training, 1) if i % step], training[step - 1 :: step]
+
+
 def window_sets(
     recipe: Recipe, training: Sequence[Run], validation: Sequence[Run]
 ) -> tuple[WindowSet, WindowSet]:
-    """Return the training and the validation windows, both standardised by the training runs."""
-    normalisation = Normalisation.of(training)
-    window = recipe.network.window
-    return WindowSet(training, window, normalisation), WindowSet(validation, window, normalisation)
+    """Return the training and the validation windows as the network sees them, both standardised by
+    the training runs.
+    """
+    seen = as_seen(recipe, training), as_seen(recipe, validation)
+    normalisation, window = Normalisation.of(seen[0]), recipe.network.window
+    return WindowSet(seen[0], window, normalisation), WindowSet(seen[1], window, normalisation)
+
+
+def as_seen(recipe: Recipe, runs: Sequence[Run], draw: int = 0) -> list[Run]:
+    """Return the runs with the channels that the network standardises: measured in the recipe's
+    condition, with residuals in place of the wheel speeds where it wants them. Every `draw` has
+    measurement errors of its own.
+    """
+    seen = []
+    for run in runs:
+        seeds = np.random.SeedSequence([recipe.seed, draw, *run.name.encode()])
+        measurement = Measurement(recipe.condition, int(seeds.generate_state(1)[0]))
+        channels = measurement.apply(run.channels, run.stage)
+        if recipe.network.channels == "residual":
+            channels = with_residuals(channels)
+        seen.append(replace(run, channels=channels.astype(np.float32)))
+    return seen
 
 
 class Trainer:
@@ -100,7 +137,11 @@ class Trainer:
         shape = recipe.network
         network = BiLstmNetwork(
             NetworkConfig(
-                shape.window, units=shape.units, hidden=shape.hidden, dropout=shape.dropout
+                shape.window,
+                units=shape.units,
+                hidden=shape.hidden,
+                dropout=shape.dropout,
+                residual=shape.channels == "residual",
             )
         )
         for name, values in asdict(training.normalisation).items():

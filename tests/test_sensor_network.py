@@ -13,6 +13,7 @@ import torch
 
 from sensor.errors import SensorError
 from sensor.export import build_windowed, export_windowed, verify
+from sensor.features import WHEEL_SPEEDS, with_residuals
 from sensor.network import BiLstmNetwork, NetworkConfig
 from sensor.runtime import OnnxSensor
 
@@ -169,3 +170,29 @@ def test_bfloat16_gives_the_same_output_and_gradients_to_its_precision(units: in
     assert len(exact) == 10
     for name, gradient in exact.items():
         assert (rounded[name] - gradient).norm() < 0.03 * gradient.norm(), name
+
+
+def test_residual_network_takes_the_residuals_of_what_is_measured(tmp_path: Path) -> None:
+    network = make_network(NetworkConfig(residual=True))
+    network.input_mean.fill_(0.0)
+    network.input_std.fill_(0.1)
+    rng = np.random.default_rng(2)
+    samples = rng.normal(size=(60, 14)) * 0.3
+    samples[:, 6] += 30.0
+    samples[:, WHEEL_SPEEDS] = samples[:, [6]] + rng.normal(size=(60, 4)) * 0.2  # some clipped
+    measured = samples.astype(np.float32).astype(np.float64)
+    windows = np.lib.stride_tricks.sliding_window_view(
+        with_residuals(measured).astype(np.float32), 19, axis=0
+    ).transpose(0, 2, 1)
+    with torch.no_grad():
+        standardised = (torch.from_numpy(windows.copy()) - network.input_mean) / network.input_std
+        expected = network.standardised(standardised) * network.output_std + network.output_mean
+    path = export_windowed(network, tmp_path / "residual.onnx")
+    estimates = OnnxSensor(path).apply(measured, np.zeros((60, 4)))
+    np.testing.assert_allclose(estimates[18:], expected.numpy(), rtol=0.0, atol=1e-5)
+    raw = make_network()
+    raw.load_state_dict(network.state_dict())
+    other = OnnxSensor(export_windowed(raw, tmp_path / "raw.onnx")).apply(
+        measured, np.zeros((60, 4))
+    )
+    assert np.abs(other - estimates)[18:].max() > 0.01

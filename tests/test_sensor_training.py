@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
+from pydantic import ValidationError
 from sensor_run import run_of
 
 from sensor import train as train_module
@@ -13,9 +14,9 @@ from sensor.dataset import Run, write_run
 from sensor.errors import SensorError
 from sensor.metrics import evaluate
 from sensor.model_card import figure_row, main, model_card
-from sensor.recipe import RECIPES, Recipe, TrainingRecipe, read_recipe
+from sensor.recipe import RECIPES, Recipe, RunSelection, TrainingRecipe, read_recipe
 from sensor.runtime import OnnxSensor
-from sensor.training import fit, learning_rate, train
+from sensor.training import as_seen, fit, learning_rate, read_parts, train
 
 
 def linear_run(name: str, seed: int) -> Run:
@@ -68,6 +69,30 @@ def test_resumed_training_ends_in_the_same_weights(tmp_path: Path) -> None:
         fit(make_recipe(batch_size=32), TRAINING, VALIDATION, parts, resume=True)
     with pytest.raises(SensorError, match="no checkpoint"):
         fit(make_recipe(), TRAINING, VALIDATION, tmp_path / "none", resume=True)
+
+
+def test_every_draw_of_the_measurement_is_another_and_comes_again() -> None:
+    recipe = make_recipe().model_copy(update={"condition": "production"})
+    first, again, next_one = (as_seen(recipe, TRAINING, draw) for draw in (0, 0, 1))
+    for run, same, other, ideal in zip(first, again, next_one, TRAINING, strict=True):
+        np.testing.assert_array_equal(run.channels, same.channels)
+        assert np.abs(run.channels - other.channels).max() > 0.01
+        assert np.abs(run.channels - ideal.channels).max() > 0.01
+    offsets = [np.mean(run.channels[:, 0] - run.stage[:, 0]) for run in first]
+    assert abs(offsets[0] - offsets[1]) > 1e-3  # each run has its own
+
+
+def test_runs_are_held_out(tmp_path: Path) -> None:
+    for i in range(7):
+        write_run(tmp_path / f"run_{i}.parquet", linear_run(f"run_{i}", i))
+    selection = RunSelection(training=("run_*",), hold_out=3)
+    training, validation = read_parts(tmp_path, selection)
+    assert [run.name for run in validation] == ["run_2", "run_5"]
+    assert [run.name for run in training] == ["run_0", "run_1", "run_3", "run_4", "run_6"]
+    with pytest.raises(SensorError, match="of 8 runs one is held out"):
+        read_parts(tmp_path, RunSelection(training=("run_*",), hold_out=8))
+    with pytest.raises(ValidationError, match="either named"):
+        RunSelection(training=("run_*",))
 
 
 def test_train_writes_network_and_record(tmp_path: Path) -> None:

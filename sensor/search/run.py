@@ -10,11 +10,11 @@ from optuna.study import Study
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from sensor.dataset import read_runs
 from sensor.errors import SensorError
 from sensor.recipe import SearchRecipe, read_search_recipe
 from sensor.search.study import finished, open_storage, open_study, work
 from sensor.search.trial import WindowObjective
+from sensor.training import read_parts
 
 STORAGE = "studies.sqlite3"
 
@@ -44,7 +44,7 @@ def open_studies(recipe: SearchRecipe, out: Path) -> dict[int, Study]:
 def _work(
     recipe: SearchRecipe, studies: dict[int, Study], data: Path, say: Callable[[str], None]
 ) -> None:
-    runs = read_runs(data, recipe.runs.training), read_runs(data, recipe.runs.validation)
+    runs = read_parts(data, recipe.runs)
     objectives = {window: WindowObjective(recipe, window, runs, say) for window in recipe.windows}
     work(recipe, studies, objectives)
 

@@ -3,7 +3,7 @@ a study of its own over the units of the LSTM and of the dense layer, led by a G
 
 All studies lie in one SQLite file, so a search goes on where it was stopped, and several processes
 may work on it at the same time. Windows take turns: however early a search is stopped, each has had
-about as many trials. Every draw depends on (seed, window, number of the trial); one process alone
+about as many trials. Every draw depends on (seed, window, trials before); one process alone
 therefore ends in the same trials, interrupted or not.
 """
 
@@ -25,8 +25,6 @@ from scipy.stats import qmc
 from sensor.errors import SensorError
 from sensor.recipe import SearchRecipe
 
-# A trial whose process has given no sign of life for so long [s] counts as failed.
-_HEARTBEAT_S, _GRACE_S = 20, 60
 Objective = Callable[[Trial], float]
 
 
@@ -48,9 +46,10 @@ class SeededSampler(BaseSampler):
         self, study: Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
     ) -> dict[str, Any]:
         """Return the parameters of a trial."""
-        if trial.number < self._startup or len(finished(study)) < 2:
-            return self._spread(trial.number)
-        seed = int(np.random.SeedSequence([self._seed, trial.number]).generate_state(1)[0])
+        before = sum(other.number < trial.number for other in taken(study))
+        if before < self._startup or len(finished(study)) < 2:
+            return self._spread(before)
+        seed = int(np.random.SeedSequence([self._seed, before]).generate_state(1)[0])
         return GPSampler(seed=seed, n_startup_trials=0).sample_relative(study, trial, search_space)
 
     def sample_independent(self, *_: Any) -> Any:
@@ -69,16 +68,19 @@ class SeededSampler(BaseSampler):
         }
 
 
-def open_storage(path: Path) -> BaseStorage:
-    """Open the file of the studies; makes it where there is none."""
+def open_storage(path: Path, heartbeat_s: int = 20, grace_s: int = 60) -> BaseStorage:
+    """Open the file of the studies; makes it where there is none.
+
+    A trial whose process has given no sign of life for `grace_s` counts as failed.
+    """
     with warnings.catch_warnings():
         # Optuna calls heartbeats experimental; without them a killed process's trial never ends.
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
         return RDBStorage(
             f"sqlite:///{path}",
             engine_kwargs={"connect_args": {"timeout": 60}},
-            heartbeat_interval=_HEARTBEAT_S,
-            grace_period=_GRACE_S,
+            heartbeat_interval=heartbeat_s,
+            grace_period=grace_s,
         )
 
 
@@ -135,7 +137,9 @@ def work(
         if len(states) >= recipe.trials * len(studies):
             time.sleep(1.0)
             for study in studies.values():
-                optuna.storages.fail_stale_trials(study)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+                    optuna.storages.fail_stale_trials(study)
 
 
 def _claimed(objective: Objective, trials: int) -> Objective:
