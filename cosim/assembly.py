@@ -128,14 +128,16 @@ def assemble(
     controller: Passive | SkyhookSettings,
     sensor: SensorBlock | None = None,
     dampers: ControllerBlock | None = None,
+    roads: Path | None = None,
 ) -> Assembly:
     """Connect the blocks of `scenario` with one of its controllers.
 
-    `sensor` and `dampers` replace the scenario's own (the data set is built so). Raises
+    `sensor` and `dampers` replace the scenario's own (the data set is built so), `roads` is where
+    its road is kept in place of the cache. Raises
     `InputError` with everything wrong in the scenario, `FmuError` or `NetworkError` for a file that
     does not load.
     """
-    wiring, description, course, plan = checked_parts(scenario)
+    wiring, description, course, plan = checked_parts(scenario, roads)
     file = None
     if sensor is None:
         file = estimator_file(scenario)
@@ -183,7 +185,9 @@ def record_groups(condition: Condition = "ideal") -> list[tuple[str, list[Signal
     ]
 
 
-def checked_parts(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan]:
+def checked_parts(
+    scenario: Scenario, roads: Path | None = None
+) -> tuple[Wiring, Description, Course, Plan]:
     """Return the vehicle FMU, its wiring, the course and what is driven on it, after all that can
     be wrong was looked for; raises `InputError` with every problem.
     """
@@ -201,7 +205,7 @@ def checked_parts(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan
     problems += stage_problems(scenario, wiring, description.path.name)
     found = None
     try:
-        found = _planned(scenario)
+        found = _planned(scenario, roads)
     except InputError as error:
         problems += error.problems
     if problems or found is None:
@@ -209,11 +213,11 @@ def checked_parts(scenario: Scenario) -> tuple[Wiring, Description, Course, Plan
     return wiring, description, *found
 
 
-def _planned(scenario: Scenario) -> tuple[Course, Plan]:
+def _planned(scenario: Scenario, roads: Path | None) -> tuple[Course, Plan]:
     """Return the course and what is driven on it; raises `InputError`."""
     manoeuvre = manoeuvre_of(scenario, STEP_S)
     needed = manoeuvre.road_length
-    course = course_of(scenario, needed)
+    course = course_of(scenario, needed, roads)
     track = course.track
     if scenario.driver.speed_kmh is None and not np.isfinite(track.speed_limit).all():
         sentence = f"the {track.name} road has no speed limit: give driver.speed_kmh"

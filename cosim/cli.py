@@ -8,21 +8,15 @@ scenarios the highest.
 from __future__ import annotations
 
 import json
-import os
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
-from cosim.errors import CosimError, explained
-
-INTERRUPTED = 130
-# Libraries would start a thread per core: slower for arrays as small as these, and sums in another
-# order where a batch leaves each process one core.
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+from cosim.exit_codes import cores, failures_as_exit_codes, one_thread
+from cosim.sensor_cli import sensor
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -75,35 +69,15 @@ def run(
     labelled = [(text, f"--set {text}") for text in overrides]
     if duration is not None:
         labelled.append((f"duration={duration}", f"--duration {duration}"))
-    for name in ONE_THREAD:
-        os.environ.setdefault(name, "1")
-    with _failures_as_exit_codes():
+    one_thread()
+    with failures_as_exit_codes():
         if len(scenarios) == 1 and not Path(scenarios[0]).is_dir():
             code = _run_one(scenarios[0], labelled, output_dir, as_json)
         else:
             paths = [Path(name) for name in scenarios]
             results = output_dir or Path("results")
-            code = _run_several(paths, labelled, results, as_json, jobs or _cores())
+            code = _run_several(paths, labelled, results, as_json, jobs or cores())
     sys.exit(code)
-
-
-@main.command()
-@click.argument("recipe", type=click.Path(path_type=Path))
-@click.option(
-    "--out",
-    metavar="DIR",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="Where the Parquet files go, one per run; runs that are there already are kept.",
-)
-@click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
-def dataset(recipe: Path, out: Path, workers: int) -> None:
-    """Drive the runs of RECIPE, a YAML file, and write them as data for training."""
-    with _failures_as_exit_codes():
-        from cosim.dataset import drive_all
-
-        count = drive_all(recipe, out, workers, lambda stem: click.echo(stem, err=True))
-        click.echo(f"{count} runs in {out}", err=True)
 
 
 @main.command()
@@ -123,7 +97,7 @@ def check(fmus: tuple[Path, ...], as_json: bool, static: bool, timeout: float) -
 
     Each FMU runs in processes of its own, so that a crash or a hang becomes a finding.
     """
-    with _failures_as_exit_codes():
+    with failures_as_exit_codes():
         from cosim.check.command import run as run_checks
 
         code = run_checks(fmus, as_json, static, timeout)
@@ -136,7 +110,7 @@ def check(fmus: tuple[Path, ...], as_json: bool, static: bool, timeout: float) -
 @click.option("--all", "every", is_flag=True, help="Show long lists of variables in full.")
 def inspect(path: Path, as_json: bool, every: bool) -> None:
     """Show what is inside PATH: an FMU, an ONNX network, a scenario or an OpenCRG road."""
-    with _failures_as_exit_codes():
+    with failures_as_exit_codes():
         from cosim.inspect.command import run as run_inspection
 
         run_inspection(path, as_json, every)
@@ -190,24 +164,4 @@ def _print_json(value: object) -> None:
     click.echo(json.dumps(value, indent=2, ensure_ascii=False))
 
 
-def _cores() -> int:
-    """Return how many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-@contextmanager
-def _failures_as_exit_codes() -> Iterator[None]:
-    try:
-        yield
-    except BrokenPipeError:
-        raise  # whoever read the output has seen enough; click ends quietly
-    except (CosimError, OSError) as error:
-        code, sentences = explained(error)
-        for sentence in sentences:
-            click.echo(f"error: {sentence}", err=True)
-        sys.exit(code)
-    except KeyboardInterrupt:
-        click.echo("interrupted; what was recorded until then is on disk", err=True)
-        sys.exit(INTERRUPTED)
+main.add_command(sensor)

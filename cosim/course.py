@@ -22,9 +22,9 @@ from cosim.road import (
     track_of_file,
 )
 from cosim.road.circle import load_circle
+from cosim.road.winding import load_winding
 from cosim.scenario.obstacles import BumpRow, SpeedHump
 from cosim.scenario.obstacles import Obstacle as ObstacleSettings
-from cosim.scenario.road import Road
 from cosim.scenario.schema import Scenario
 from cosim.scenario.surface import CobbleSurface, IsoSurface
 
@@ -51,7 +51,7 @@ def course_of(
         if road.file is not None:
             file = scenario.resolve(road.file).resolve()
             return Course(track_of_file(file), file)
-        track = _track(road, length)
+        track = _track(scenario, length)
         obstacles = _obstacles(scenario, track.length)
         return Course(track, build_road(track, _surface(scenario), cache_dir, obstacles))
     except RoadError as error:
@@ -59,7 +59,10 @@ def course_of(
         raise InputError(scenario.problem(key, str(error))) from None
 
 
-def _track(road: Road, length: float | None) -> Track:
+def _track(scenario: Scenario, length: float | None) -> Track:
+    road = scenario.road
+    if road.track == "winding":
+        return load_winding(float(road.length_m or 0.0), _seed(scenario, road.seed))
     if road.track == "circle":
         angle = 270.0 if road.angle_deg is None else road.angle_deg
         return load_circle(float(road.radius_m or 0.0), angle, road.direction or "left")

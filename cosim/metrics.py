@@ -73,6 +73,7 @@ MANOEUVRE_FIGURES: Final = {
     ),
     "brake": (*_CHANGE, "mean_deceleration_m_s2"),
     "accelerate": (*_CHANGE, "mean_acceleration_m_s2"),
+    "mix": ("speed_mean_kmh", *_LARGEST),
 }
 
 # A unit is read off the end of a figure's name; of two endings that fit, the first here counts.

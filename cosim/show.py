@@ -41,6 +41,37 @@ def progress() -> Iterator[Progress | None]:
         yield tell
 
 
+@contextmanager
+def runs(total: int) -> Iterator[Callable[[str, bool], None]]:
+    """Give what is told of each run of a data set that has ended, by its name and whether it came
+    to its end: a progress bar on a terminal, plain lines elsewhere.
+    """
+    if not total or not sys.stderr.isatty():
+        width, ended = len(str(total)), 0
+
+        def say(name: str, well: bool) -> None:
+            nonlocal ended
+            ended += 1
+            click.echo(f"[{ended:{width}d}/{total}] {name}{'' if well else ': FAILED'}", err=True)
+
+        yield say
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    columns = (BarColumn(), MofNCompleteColumn(), Remaining(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=total)
+
+        def tell(name: str, well: bool) -> None:
+            bar.update(task, advance=1, description=name)
+            if not well:
+                bar.console.print(f"{name}: FAILED", style="bold red", highlight=False)
+
+        yield tell
+
+
 def counter(total: int) -> Callable[[Ended], None]:
     """Return what says a line for each scenario of a batch that has ended."""
     width, ended = len(str(total)), 0

@@ -7,7 +7,7 @@ ellipse accelerates and brakes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Final
 
 import numpy as np
@@ -25,6 +25,15 @@ class Style:
     accelerate: float
     brake: float
     corner: float
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The same along a track, all (n,) [m/s2]."""
+
+    accelerate: Array
+    brake: Array
+    corner: Array
 
 
 STYLES: Final = {
@@ -56,17 +65,35 @@ def speed_profile(track: Track, style: Style, cap: float | None = None) -> Array
         speed = np.minimum(speed, cap)
     for stop in track.stops:
         speed[np.searchsorted(track.s, stop[0])] = 0.0
+    everywhere = [np.full_like(speed, value) for value in astuple(style)]
+    return _within(track, speed, Limits(*everywhere))
+
+
+def profile_within(track: Track, wanted: Array, limits: Limits) -> Array:
+    """Return the speed [m/s] at each point of `track.s` (n,) that comes nearest to the `wanted` one
+    (n,) within limits that change along the track.
+    """
+    bends = np.sqrt(limits.corner / np.maximum(np.abs(track.curvature), 1e-6))
+    return _within(track, np.minimum(wanted, bends), limits)
+
+
+def _within(track: Track, speed: Array, limits: Limits) -> Array:
+    """Lower a speed (n,) to what accelerating from before and braking for what follows allow."""
+    curvature = np.abs(track.curvature)
     step = float(track.s[1] - track.s[0])
-    forward = _limited(speed, curvature, step, style.accelerate, style.corner)
-    return _limited(forward[::-1], curvature[::-1], step, style.brake, style.corner)[::-1]
+    across = limits.corner
+    forward = _limited(speed, curvature, step, limits.accelerate, across)
+    back = (forward[::-1], curvature[::-1], step, limits.brake[::-1], across[::-1])
+    return _limited(*back)[::-1]
 
 
-def _limited(speed: Array, curvature: Array, step: float, along: float, across: float) -> Array:
-    """One pass along the array: v dv/ds within the ellipse of `along` and `across`."""
+def _limited(speed: Array, curvature: Array, step: float, along: Array, across: Array) -> Array:
+    """One pass along the array: v dv/ds within the ellipse of `along` and `across` (n,)."""
     squares = (speed * speed).tolist()
-    for i, bend in enumerate(curvature[:-1].tolist()):
-        used = min(squares[i] * bend / across, 1.0)
-        reachable = squares[i] + 2 * step * along * (1 - used * used) ** 0.5
+    points = zip(curvature[:-1].tolist(), along.tolist(), across.tolist(), strict=False)
+    for i, (bend, most, corner) in enumerate(points):
+        used = min(squares[i] * bend / corner, 1.0)
+        reachable = squares[i] + 2 * step * most * (1 - used * used) ** 0.5
         if reachable < squares[i + 1]:
             squares[i + 1] = reachable
     speeds: Array = np.sqrt(np.array(squares))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,169 +13,57 @@ from loop_rig import write_scenario
 from cosim.assembly import assemble
 from cosim.cli import main
 from cosim.controller import SwitchingDampers
-from cosim.dataset import (
-    DatasetRecipe,
-    NoSensor,
-    PlannedRun,
-    Selection,
-    build,
-    drive,
-    drive_all,
-    load_recipe,
-    plan,
-)  # fmt: skip
+from cosim.dataset import NoSensor
+from cosim.dataset.build import missing
+from cosim.dataset.drive import drive
+from cosim.dataset.plan import COMMAND, PlannedRun
+from cosim.dataset.recipe import Dampers
 from cosim.errors import InputError
 from cosim.quantities import CORNERS
 from cosim.scenario.load import load
+from cosim.scenario.overrides import Override, split_key
 from sensor.channels import CHANNELS, PASSIVE_COMMAND
 from sensor.conditions import PRODUCTION_PARAMETERS
 from sensor.dataset import Run, read_run
 
-ROOT = Path(__file__).resolve().parent.parent
-RECIPE = """\
-name: a few
-seed: 3
-runs:
-  - scenarios: b_*.yaml
-    dampers: [switching, passive]
-  - scenarios: a_*.yaml
-    dampers: [passive]
-"""
 CLASS_B = "{kind: iso8608, class: B}"
 
 
 def short(
     folder: Path, name: str = "a_short", duration: str = "lap", surface: str = CLASS_B,
-    obstacles: str = "", controllers: str = "[{kind: passive}]",
+    obstacles: str = "", controllers: str = "[{kind: passive}]", length_m: float = 25,
 ) -> Path:  # fmt: skip
     """Twenty-five metres, less than two seconds."""
     return write_scenario(
         folder,
         name=name,
         duration=duration,
-        length_m=25,
+        length_m=length_m,
         surface=surface,
         obstacles=obstacles,
         sections={"controllers": controllers},
     )
 
 
-# ---------------------------------------------------------------- recipe and plan
-
-
-def test_runs_are_in_the_order_of_the_recipe_then_of_the_names(tmp_path: Path) -> None:
-    for name in ("b_2", "a_1", "b_10", "c_1"):
-        (tmp_path / f"{name}.yaml").touch()
-    (tmp_path / "recipe.yaml").write_text(RECIPE)
-    runs = plan(load_recipe(tmp_path / "recipe.yaml"), tmp_path)
-    assert [run.stem for run in runs] == [
-        "b_10_switching", "b_10_passive", "b_2_switching", "b_2_passive", "a_1_passive",
-    ]  # fmt: skip
-    assert [run.seed for run in runs] == [3000, 3001, 3002, 3003, 3004]
-    assert all(run.scenario.is_file() for run in runs)
-
-
-def test_each_surface_is_a_run_of_its_own(tmp_path: Path) -> None:
-    (tmp_path / "a.yaml").touch()
-    one = Selection(scenarios="a.yaml", surfaces=("A", "smooth"), dampers=("passive", "switching"))
-    runs = plan(DatasetRecipe(name="surfaces", seed=0, runs=(one,)), tmp_path)
-    assert [(run.stem, run.overrides) for run in runs] == [
-        ("a_class_a_passive", ["seed=0", "road.surface=A"]),
-        ("a_class_a_switching", ["seed=1", "road.surface=A"]),
-        ("a_smooth_passive", ["seed=2", "road.surface=smooth"]),
-        ("a_smooth_switching", ["seed=3", "road.surface=smooth"]),
-    ]
-
-
-def test_a_pattern_without_a_file(tmp_path: Path) -> None:
-    (tmp_path / "b_1.yaml").touch()
-    (tmp_path / "recipe.yaml").write_text(RECIPE)
-    with pytest.raises(InputError, match=r"a_\*\.yaml"):
-        plan(load_recipe(tmp_path / "recipe.yaml"), tmp_path)
-
-
-def test_a_run_that_is_meant_twice(tmp_path: Path) -> None:
-    (tmp_path / "a.yaml").touch()
-    twice = tuple(
-        Selection(scenarios=pattern, dampers=("passive",)) for pattern in ("a*", "*.yaml")
-    )
-    recipe = DatasetRecipe(name="twice", seed=0, runs=twice)
-    with pytest.raises(InputError, match="a_passive"):
-        plan(recipe, tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("seed: 3", "sead: 3", ("sead", "seed")),
-        ("seed: 3", "seed: -1", ("seed", "greater than or equal to 0")),
-        ("seed: 3", "seed: 1.5", ("seed", "integer")),
-        ("[passive]", "[passive, active]", ("runs.1.dampers.1", "'passive' or 'switching'")),
-        ("[passive]", "[]", ("runs.1.dampers",)),
-        ("    dampers: [passive]", "    surfaces: [E]\n    dampers: [passive]", ("surfaces.0",)),
-        ("b_*.yaml", "''", ("runs.0.scenarios",)),
-        ("name: a few\n", "", ("name",)),
-        ("seed: 3", "seed: 3\nseed: 4", ("seed",)),
-        ("seed: 3", "seed: [", ("recipe.yaml",)),
-        (RECIPE, "", ("recipe.yaml",)),
-        (RECIPE, "- one\n", ("recipe.yaml",)),
-        (RECIPE, "name: a\nseed: 1\nruns: []\n", ("runs",)),
-    ],
-)
-def test_mistakes_in_a_recipe(tmp_path: Path, old: str, new: str, words: tuple[str, ...]) -> None:
-    path = tmp_path / "recipe.yaml"
-    path.write_text(RECIPE.replace(old, new))
-    with pytest.raises(InputError) as caught:
-        load_recipe(path)
-    message = str(caught.value)
-    assert message.startswith(str(path))
-    assert all(word in message for word in words)
-
-
-def test_all_mistakes_of_a_recipe_at_once(tmp_path: Path) -> None:
-    path = tmp_path / "recipe.yaml"
-    path.write_text(RECIPE.replace("seed: 3", "seed: -3\nsize: 4").replace("[passive]", "[odd]"))
-    with pytest.raises(InputError) as caught:
-        load_recipe(path)
-    assert all(name in str(caught.value) for name in ("seed", "size", "dampers"))
-
-
-def test_no_recipe(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"gone\.yaml: No such file"):
-        load_recipe(tmp_path / "gone.yaml")
-
-
-def test_a_recipe_that_is_no_text(tmp_path: Path) -> None:
-    path = tmp_path / "recipe.yaml"
-    path.write_bytes(b"name: \xff\xfe\n")
-    with pytest.raises(InputError, match=r"recipe\.yaml"):
-        load_recipe(path)
-
-
-def test_the_recipe_of_the_published_network() -> None:
-    """Every run has a file and a seed of its own, whatever machine drives it."""
-    file = ROOT / "scenarios" / "datasets" / "paper.yaml"
-    runs = plan(load_recipe(file), file.parent)
-    assert len({run.stem for run in runs}) == len({run.seed for run in runs}) == len(runs)
-    assert {run.scenario.stem.split("_")[0] for run in runs} == {"heilbronn", "rural", "hockenheim"}
-    assert all(run.dampers == "passive" for run in runs if "hockenheim" in run.stem)
-    assert all(load(run.scenario, run.overrides).duration == "lap" for run in runs)
-    assert len(runs) == 30
-    assert {run.surface for run in runs} == {"A", "smooth"}
-
-
 # ---------------------------------------------------------------- driving
+
+
+def planned_run(scenario: Path, dampers: Dampers, seed: int, **more: Any) -> PlannedRun:
+    """A run as a recipe without draws plans it."""
+    fields = {"seed": seed, **more.pop("fields", {})}
+    overrides = tuple(Override(split_key(k), v, "the recipe") for k, v in fields.items())
+    return PlannedRun(f"{scenario.stem}_{dampers}", scenario, dampers, seed, overrides, **more)
 
 
 def recorded(planned: PlannedRun, directory: Path) -> Run:
     directory.mkdir(exist_ok=True)
-    assert drive(planned, directory) == planned.stem
+    assert drive(planned, directory) > 0.0
     return read_run(directory / f"{planned.stem}.parquet")
 
 
 def test_a_run_is_what_the_loop_records(tmp_path: Path) -> None:
     """All rows of the lap, as the sensor's own reader takes them."""
-    planned = PlannedRun(short(tmp_path), "passive", 5)
+    planned = planned_run(short(tmp_path), "passive", 5)
     run = recorded(planned, tmp_path / "data")
     scenario = load(planned.scenario, ["seed=5"])
     again = assemble(scenario, scenario.controllers[0], NoSensor())
@@ -196,7 +84,7 @@ def test_a_run_is_what_the_loop_records(tmp_path: Path) -> None:
 
 def test_production_sensors_are_recorded_as_they_are_mounted(tmp_path: Path) -> None:
     """Turned, moved and slowed, but the same motion; without the settings it is that of the car."""
-    run = recorded(PlannedRun(short(tmp_path), "passive", 5), tmp_path / "data")
+    run = recorded(planned_run(short(tmp_path), "passive", 5), tmp_path / "data")
     ideal = run.channels[:, [i for i, c in enumerate(CHANNELS) if "Steer" not in c.name]]
     assert run.stage.shape == ideal.shape
     assert not (run.stage == ideal).all(axis=0).any()
@@ -207,7 +95,7 @@ def test_production_sensors_are_recorded_as_they_are_mounted(tmp_path: Path) -> 
 
 def test_a_command_of_a_run_is_the_one_that_led_to_its_sample(tmp_path: Path) -> None:
     path = short(tmp_path)
-    run = recorded(PlannedRun(path, "switching", 5), tmp_path / "data")
+    run = recorded(planned_run(path, "switching", 5), tmp_path / "data")
     scenario = load(path, ["seed=5"])
     again = assemble(scenario, scenario.controllers[0], NoSensor(), SwitchingDampers(5, 0.01))
     again.run(None)
@@ -217,7 +105,7 @@ def test_a_command_of_a_run_is_the_one_that_led_to_its_sample(tmp_path: Path) ->
 
 
 def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
-    planned = PlannedRun(short(tmp_path), "switching", 5)
+    planned = planned_run(short(tmp_path), "switching", 5)
     files = []
     for folder in ("one", "two"):
         recorded(planned, tmp_path / folder)
@@ -227,7 +115,7 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_the_seed_is_that_of_the_surface(tmp_path: Path) -> None:
     path = short(tmp_path)
-    truths = [recorded(PlannedRun(path, "passive", s), tmp_path / str(s)).truth for s in (5, 6)]
+    truths = [recorded(planned_run(path, "passive", s), tmp_path / str(s)).truth for s in (5, 6)]
     assert not np.array_equal(truths[0], truths[1])
 
 
@@ -237,9 +125,9 @@ def test_dampers_that_switch_are_driven_and_noted(tmp_path: Path) -> None:
         surface="smooth",
         obstacles="{kind: bumps, height_m: 0.03, length_m: 0.5, spacing_m: 4}",
     )
-    passive = recorded(PlannedRun(path, "passive", 5), tmp_path / "data")
-    switching = recorded(PlannedRun(path, "switching", 5), tmp_path / "data")
-    other = recorded(PlannedRun(path, "switching", 6), tmp_path / "other")
+    passive = recorded(planned_run(path, "passive", 5), tmp_path / "data")
+    switching = recorded(planned_run(path, "switching", 5), tmp_path / "data")
+    other = recorded(planned_run(path, "switching", 6), tmp_path / "other")
     assert switching.recipe["dampers"] == "switching"
     rms = [float(np.sqrt(np.mean(run.truth**2))) for run in (passive, switching, other)]
     assert len(set(rms)) == 3  # a smooth seedless surface: only the dampers differ
@@ -254,56 +142,109 @@ def test_dampers_that_switch_are_driven_and_noted(tmp_path: Path) -> None:
 def test_passive_means_passive_whatever_the_scenario_controls(tmp_path: Path) -> None:
     skyhook = short(tmp_path, "skyhook", controllers="[{kind: skyhook, feedback: truth}]")
     runs = [
-        recorded(PlannedRun(path, "passive", 5), tmp_path / "data")
+        recorded(planned_run(path, "passive", 5), tmp_path / "data")
         for path in (skyhook, short(tmp_path))
     ]
     np.testing.assert_array_equal(runs[0].truth, runs[1].truth)
 
 
-def test_a_lap_that_is_not_finished_is_no_run(tmp_path: Path) -> None:
-    path = short(tmp_path, duration="0.5")
-    with pytest.raises(InputError, match=r"a_short\.yaml: the lap was not finished"):
-        drive(PlannedRun(path, "passive", 1), tmp_path)
-    assert [file.name for file in tmp_path.iterdir()] == ["a_short.yaml"]
+def test_a_fixed_command_is_the_drawn_one(tmp_path: Path) -> None:
+    run = recorded(planned_run(short(tmp_path), "fixed", 5, drawn={COMMAND: 0.75}), tmp_path / "d")
+    np.testing.assert_array_equal(run.commands, np.float32(0.75))
+    assert run.recipe["drawn"] == {COMMAND: 0.75}
+
+
+def test_skyhook_acts_on_the_truth(tmp_path: Path) -> None:
+    """Soft where damping would push the body on, so the commands reach both ends."""
+    run = recorded(planned_run(short(tmp_path, length_m=40), "skyhook", 5), tmp_path / "data")
+    assert run.commands.min() == 0.0
+    assert run.commands.max() > 0.8
+
+
+def test_drawn_values_are_driven(tmp_path: Path) -> None:
+    """An even road is an even road: nothing of the scenario's own surface is left."""
+    fields = {"road.surface": "smooth", "vehicle.parameters.Load.Mass": 300}
+    planned = planned_run(short(tmp_path), "passive", 5, fields=fields)
+    run = recorded(planned, tmp_path / "data")
+    assert (run.road == 0.0).all()
+    assert run.recipe["fields"] == {"seed": 5, **fields}
+
+
+def test_a_given_time_of_a_lap_is_a_run(tmp_path: Path) -> None:
+    run = recorded(planned_run(short(tmp_path, duration="0.5"), "passive", 1), tmp_path / "data")
+    assert len(run.truth) == 51
+
+
+def unreachable(folder: Path) -> Path:
+    """With a hundredth of the accelerator the car cannot even keep its speed."""
+    sections = {
+        "manoeuvre": "{kind: accelerate, pedal: 0.01, to_kmh: 51, start_m: 0}",
+        "road": "{track: straight, length_m: 300}",
+    }
+    return write_scenario(folder, name="b_weak", duration="lap", sections=sections)
+
+
+def test_a_manoeuvre_that_is_not_finished_is_no_run(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"b_weak\.yaml: after .* s: manoeuvre not finished"):
+        drive(planned_run(unreachable(tmp_path), "passive", 1), tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == ["b_weak.yaml"]
+
+
+# ---------------------------------------------------------------- building
 
 
 def test_runs_that_are_there_are_kept_and_outdated_ones_driven_again(tmp_path: Path) -> None:
-    path, directory = short(tmp_path), tmp_path / "new" / "data"
+    path, directory = short(tmp_path), tmp_path / "data"
 
     def built(*runs: PlannedRun) -> list[str]:
-        told: list[str] = []
-        with ThreadPoolExecutor(1) as executor:
-            build(list(runs), directory, executor, told.append)
-        return told
+        left = missing(runs, directory)
+        for run in left:
+            recorded(run, directory)
+        return [run.stem for run in left]
 
-    passive, switching = PlannedRun(path, "passive", 1), PlannedRun(path, "switching", 2)
+    passive, switching = planned_run(path, "passive", 1), planned_run(path, "switching", 2)
     assert built(passive) == ["a_short_passive"]
     assert built(passive, switching) == ["a_short_switching"]
-    assert built(PlannedRun(path, "passive", 3), switching) == ["a_short_passive"]
+    assert built(planned_run(path, "passive", 3), switching) == ["a_short_passive"]
     (directory / "a_short_switching.parquet").write_text("torn")
     assert built(switching) == ["a_short_switching"]
+    whole = (directory / "a_short_switching.parquet").read_bytes()
+    (directory / "a_short_switching.parquet").write_bytes(whole[: len(whole) // 2])
+    assert built(switching) == ["a_short_switching"]
+    assert (directory / "a_short_switching.parquet").read_bytes() == whole
     path.write_text(path.read_text() + "# another scenario\n")
     assert built(switching) == ["a_short_switching"]
-    assert len(read_run(directory / "a_short_switching.parquet").truth) > 100
 
 
-def test_processes_of_their_own(tmp_path: Path) -> None:
-    """What the first one drove stays, and the second one's mistake arrives as it was."""
+def test_a_run_that_fails_is_named_and_the_others_are_written(tmp_path: Path) -> None:
+    unreachable(tmp_path)
     short(tmp_path, "a_short")
-    short(tmp_path, "b_long", duration="0.5")
-    runs = "runs: [{scenarios: '?_*.yaml', dampers: [passive]}]"
-    (tmp_path / "recipe.yaml").write_text(f"name: two\nseed: 1\n{runs}\n")
-    told: list[str] = []
-    with pytest.raises(InputError, match=r"b_long\.yaml: the lap was not finished"):
-        drive_all(tmp_path / "recipe.yaml", tmp_path / "data", 1, told.append)
-    assert told == ["a_short_passive"]
-    assert read_run(tmp_path / "data" / "a_short_passive.parquet").recipe["seed"] == 1000
+    short(tmp_path, "c_short")
+    recipe = tmp_path / "recipe.yaml"
+    recipe.write_text("name: x\nseed: 1\nruns: [{scenarios: '?_*.yaml', dampers: [passive]}]\n")
+    command = ["sensor", "dataset", str(recipe), "--out", str(tmp_path / "data"), "--jobs", "1"]
+    result = CliRunner().invoke(main, command)
+    assert result.exit_code == 2
+    assert "error: b_weak_passive: " in result.stderr
+    assert "b_weak.yaml: after" in result.stderr
+    assert "2 runs of" in result.stderr
+    assert "1 FAILED" in result.stderr
+    files = sorted(file.name for file in (tmp_path / "data").iterdir())
+    assert files == ["a_short_passive.parquet", "c_short_passive.parquet"]
+    unreachable(tmp_path).write_text((tmp_path / "a_short.yaml").read_text())
+    result = CliRunner().invoke(main, command)
+    assert result.exit_code == 0
+    assert "[1/1] b_weak_passive\n" in result.stderr
+    assert "2 were there" in result.stderr
+    assert read_run(tmp_path / "data" / "b_weak_passive.parquet").recipe["seed"] == 1001
 
 
 def test_the_command_shows_a_mistake_without_a_traceback(tmp_path: Path) -> None:
     path = tmp_path / "recipe.yaml"
-    path.write_text(RECIPE)
-    result = CliRunner().invoke(main, ["dataset", str(path), "--out", str(tmp_path / "data")])
+    path.write_text("name: x\nseed: 1\nruns: [{scenarios: b_*.yaml, dampers: [passive]}]\n")
+    command = ["sensor", "dataset", str(path), "--out", str(tmp_path / "data")]
+    result = CliRunner().invoke(main, command)
     assert result.exit_code == 2
     assert "matches 'b_*.yaml'" in result.stderr
     assert "Traceback" not in result.output
+    assert not (tmp_path / "data").exists()

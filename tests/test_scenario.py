@@ -108,7 +108,7 @@ def test_a_field_in_the_wrong_section_is_sent_to_the_right_one(tmp_path):
         ("name: &a [*a]\n", "inside its own anchor"),
         ("name: a\n", "the scenario has no road, which it needs"),
         ("name: a\nroad: {track: straight}\n", "needs its length_m"),
-        ("name: a\nroad: {track: rural, length_m: 50}\n", "straight track only"),
+        ("name: a\nroad: {track: rural, length_m: 50}\n", "straight or the winding track only"),
         ("name: a\nroad: {track: rural, file: a.crg}\n", "either track or file"),
         ("name: a\nroad: {}\n", "either track or file"),
         ("name: a\nroad: {file: a.txt}\n", "an OpenCRG road (.crg)"),

@@ -10,14 +10,24 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from functools import partial
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from cosim.batch import worker
 from cosim.batch.job import Ended, Job
 
-Work = Callable[[Job], Ended]
+J = TypeVar("J")
+E = TypeVar("E")
 Tell = Callable[[Ended], None]
-_DIED = "the process ended without a word: the FMU has taken it down"
+DIED = "the process ended without a word: the FMU has taken it down"
+
+
+@dataclass(frozen=True)
+class Task(Generic[J, E]):
+    """What a process does with a job, and what is said of a job whose process died."""
+
+    work: Callable[[J], E]
+    died: Callable[[J], E]
 
 
 def run_all(
@@ -28,49 +38,54 @@ def run_all(
     Where a check finds something, nothing is run and the jobs come back with their problems. `tell`
     hears of each job that has been run.
     """
-    with _pool(min(processes, len(jobs))) as pool:
-        checked = _through(pool, worker.check, jobs, lambda ended: None)
+
+    def died(job: Job) -> Ended:
+        return Ended(job, 3, (DIED,))
+
+    with pool_of(min(processes, len(jobs))) as pool:
+        checked = through(pool, Task(worker.check, died), jobs, lambda ended: None)
         if any(ended.problems for ended in checked.values()):
             return [checked[job] for job in jobs], False
         # The longest first: what is begun last should not be what all wait for.
         order = sorted(jobs, key=lambda job: -checked[job].longest_s)
-        ended = _through(pool, worker.drive, order, tell)
+        ended = through(pool, Task(worker.drive, died), order, tell)
     return [ended[job] for job in jobs], True
 
 
-def _pool(processes: int) -> ProcessPoolExecutor:
+def pool_of(processes: int) -> ProcessPoolExecutor:
+    """Return spawned processes that take jobs."""
     import multiprocessing
 
     context = multiprocessing.get_context("spawn")
     return ProcessPoolExecutor(processes, context, initializer=worker.start)
 
 
-def _through(
-    pool: ProcessPoolExecutor, work: Work, jobs: Sequence[Job], tell: Tell
-) -> dict[Job, Ended]:
-    """Return what `work` makes of the jobs; those whose process died are done again, each in a
-    process alone, so that the one at fault is found.
+def through(
+    pool: ProcessPoolExecutor, task: Task[J, E], jobs: Sequence[J], tell: Callable[[E], None]
+) -> dict[J, E]:
+    """Return what comes of the jobs; those whose process died are done again, each in a process
+    alone, so that the one at fault is found. `tell` hears of each as it ends.
     """
-    ended = _tried(pool, work, jobs, tell)
+    ended = _tried(pool, task, jobs, tell)
     left = [job for job in jobs if job not in ended]
     with ThreadPoolExecutor(max(len(left), 1)) as threads:
-        for done in threads.map(partial(_alone, work), left):
-            ended[done.job] = done
+        for job, done in zip(left, threads.map(lambda job: _alone(task, job), left), strict=True):
+            ended[job] = done
             tell(done)
     return ended
 
 
 def _tried(
-    pool: ProcessPoolExecutor, work: Work, jobs: Sequence[Job], tell: Tell
-) -> dict[Job, Ended]:
+    pool: ProcessPoolExecutor, task: Task[J, E], jobs: Sequence[J], tell: Callable[[E], None]
+) -> dict[J, E]:
     """Return the jobs that came to an end, whatever it was; one that died may take others along."""
-    ended: dict[Job, Ended] = {}
-    waiting = [pool.submit(work, job) for job in jobs]
+    ended: dict[J, E] = {}
+    waiting = {pool.submit(task.work, job): job for job in jobs}
     try:
         for future in as_completed(waiting):
             with suppress(BrokenProcessPool):
                 done = future.result()
-                ended[done.job] = done
+                ended[waiting[future]] = done
                 tell(done)
     except KeyboardInterrupt:
         pool.shutdown(wait=True, cancel_futures=True)
@@ -78,7 +93,7 @@ def _tried(
     return ended
 
 
-def _alone(work: Work, job: Job) -> Ended:
-    with _pool(1) as pool, suppress(BrokenProcessPool):
-        return pool.submit(work, job).result()
-    return Ended(job, 3, (_DIED,))
+def _alone(task: Task[J, E], job: J) -> E:
+    with pool_of(1) as pool, suppress(BrokenProcessPool):
+        return pool.submit(task.work, job).result()
+    return task.died(job)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable
+from functools import partial
 from types import FrameType
+from typing import TypeVar
 
 from cosim.batch.job import Ended, Job
 from cosim.errors import CosimError, explained
 
+E = TypeVar("E")
 _busy = False
 
 
@@ -31,7 +34,7 @@ def check(job: Job) -> Ended:
         longest = check_scenario(scenario)
         return Ended(job, longest_s=longest * len(scenario.controllers))
 
-    return _guarded(job, look)
+    return guarded(look, partial(Ended, job))
 
 
 def drive(job: Job) -> Ended:
@@ -45,17 +48,19 @@ def drive(job: Job) -> Ended:
         outcome = execute(scenario, job.output_dir, command=job.command)
         return Ended(job, outcome.exit_code, (), outcome.metrics, outcome.notes)
 
-    return _guarded(job, run)
+    return guarded(run, partial(Ended, job))
 
 
-def _guarded(job: Job, work: Callable[[], Ended]) -> Ended:
-    """Return what went wrong as a result: other jobs go on."""
+def guarded(work: Callable[[], E], failed: Callable[[int, tuple[str, ...]], E]) -> E:
+    """Return what `work` does, or what went wrong as a result, from its exit code and sentences:
+    other jobs go on.
+    """
     global _busy
     _busy = True
     try:
         return work()
     except (CosimError, OSError) as error:
-        return Ended(job, *explained(error))
+        return failed(*explained(error))
     finally:
         _busy = False
 

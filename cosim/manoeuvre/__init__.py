@@ -8,6 +8,7 @@ from cosim.manoeuvre.constant import ConstantRadius, ConstantSpeed
 from cosim.manoeuvre.evasive import DoubleLaneChange, Slalom
 from cosim.manoeuvre.follow import FollowRoad
 from cosim.manoeuvre.gates import Body
+from cosim.manoeuvre.mix import FASTEST_MIX, Mix
 from cosim.manoeuvre.motion import Motion, motion_of
 from cosim.manoeuvre.open_loop import SineWithDwell, StepSteer
 from cosim.manoeuvre.plan import RUN_UP_S, Manoeuvre, Plan
@@ -27,6 +28,9 @@ def manoeuvre_of(scenario: Scenario, step_s: float) -> Manoeuvre:
     if wanted is None:
         style = careful(STYLES[scenario.driver.style], friction_of(scenario))
         return FollowRoad(style, None if kmh is None else kmh / 3.6)
+    if isinstance(wanted, settings.Mix):
+        seed = scenario.seed if wanted.seed is None else wanted.seed
+        return Mix(seed, (FASTEST_MIX if kmh is None else kmh) / 3.6, friction_of(scenario))
     if kmh is None:
         raise ValueError("a manoeuvre needs driver.speed_kmh")  # refused when the file was read
     speed = kmh / 3.6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -48,6 +49,35 @@ def beside(track: Track, offset: PPoly, end: float) -> Track:
         banking=np.interp(u, track.s, track.banking),
         speed_limit=np.interp(u, track.s, track.speed_limit),
     )
+
+
+def beside_bends(track: Track, offset: Callable[[Array], Array]) -> tuple[Track, Array]:
+    """Return the line at `offset`(s) [m] to the left of any open `track`, and the s of the track
+    beside each of its points (n,) [m].
+
+    The offset has a continuous second derivative and is 0 up to s = 0, where the line's own s
+    starts with the road's.
+    """
+    t = offset(track.s)
+    slope = np.gradient(t, track.s)
+    ahead = 1.0 - track.curvature * t
+    x = track.x - t * np.sin(track.heading)
+    y = track.y + t * np.cos(track.heading)
+    heading = track.heading + np.arctan2(slope, ahead)
+    stretch = np.hypot(ahead, slope)
+    run = np.concatenate(([0.0], np.cumsum(0.5 * DS * (stretch[1:] + stretch[:-1])))) + track.s[0]
+    curvature = np.gradient(heading, run)
+    s: Array = track.s[0] + DS * np.arange(int((run[-1] - run[0]) / DS) + 1)
+
+    def at(values: Array) -> Array:
+        return np.asarray(np.interp(s, run, values), dtype=np.float64)
+
+    line = Track(
+        track.name, float(np.interp(track.length, track.s, run)), False, s, at(x), at(y),
+        at(track.z), at(heading), at(curvature), at(track.grade), at(track.banking),
+        at(track.speed_limit),
+    )  # fmt: skip
+    return line, at(track.s)
 
 
 def _kept(offset: PPoly, order: int, u: Array) -> Array:

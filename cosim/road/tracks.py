@@ -7,7 +7,6 @@ road have no public layout and are made up to the known length, speeds and featu
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
@@ -18,6 +17,7 @@ from cosim.errors import did_you_mean
 from cosim.road.elements import Arc, Element, Straight, close_circuit, parse_layout
 from cosim.road.errors import RoadError
 from cosim.road.track import Knots, Layout, Stop, Track, build_track
+from cosim.road.winding import Bends, winding
 
 _HOCKENHEIM = (
     "S200 R68/69 S220 R45/102 R150/35 L150/35 S200 L160/47 R160/47 R35/89 S60 R95/84 S220 L40/155 "
@@ -57,8 +57,7 @@ _RURAL = (
 
 _HEILBRONN_LENGTH = 5790.0
 _HEILBRONN_SEED = 5790
-# From the general direction, so that the road never meets itself [rad]
-_WIDEST_HEADING = math.radians(70.0)
+_HEILBRONN_BENDS = Bends(radii=(22.0, 220.0), straights=(30.0, 140.0), begin=80.0, end=350.0)
 _HEILBRONN_LIMITS = (
     (0.0, 50.0),
     (450.0, 70.0),
@@ -106,7 +105,7 @@ def _rural() -> Layout:
 def _heilbronn() -> Layout:
     """5.79 km through hills and villages: curves from 22 m on, grades to 6 %, five stops."""
     random = np.random.default_rng(_HEILBRONN_SEED)
-    elements = _winding(random, _HEILBRONN_LENGTH)
+    elements = winding(random, _HEILBRONN_LENGTH, _HEILBRONN_BENDS)
     return Layout(
         name="heilbronn",
         elements=elements,
@@ -116,26 +115,6 @@ def _heilbronn() -> Layout:
         limits=_HEILBRONN_LIMITS,
         stops=_HEILBRONN_STOPS,
     )
-
-
-def _winding(random: np.random.Generator, length: float) -> tuple[Element, ...]:
-    """Return straights and arcs in turn, `length` m in all, that keep to one general direction."""
-    elements: list[Element] = [Straight(80.0)]
-    heading, left_over = 0.0, length - 80.0
-    while left_over > 350.0:
-        radius = float(np.exp(random.uniform(math.log(22.0), math.log(220.0))))
-        angle = float(np.clip(random.uniform(0.4, 1.9), 30.0 / radius, 180.0 / radius))
-        left = bool(random.random() < 0.5)
-        if abs(heading + (angle if left else -angle)) > _WIDEST_HEADING:
-            left = heading < 0.0
-            angle = min(angle, _WIDEST_HEADING + abs(heading))
-        heading += angle if left else -angle
-        arc = Arc(round(radius, 1), math.degrees(angle), left)
-        straight = Straight(round(float(random.uniform(30.0, 140.0)), 1))
-        elements += [arc, straight]
-        left_over -= arc.length + straight.length
-    last = elements.pop()
-    return (*elements, Straight(last.length + left_over))
 
 
 def _hills(random: np.random.Generator, length: float, steepest: float) -> Knots:

@@ -13,6 +13,7 @@ from cosim.scenario.manoeuvre import (
     ConstantSpeed,
     DoubleLaneChange,
     Manoeuvre,
+    Mix,
     SineWithDwell,
     Slalom,
     StepSteer,
@@ -31,25 +32,31 @@ _NAMES: Final[dict[type, str]] = {
     StepSteer: "the step steer",
     Brake: "braking",
     Accelerate: "accelerating",
+    Mix: "the mix",
 }
-_STRAIGHT_ONLY: Final = (DoubleLaneChange, Slalom, SineWithDwell, StepSteer)
+_TRACKS: Final[dict[type, tuple[str, ...]]] = {
+    ConstantRadius: ("circle",),
+    Mix: ("winding", "straight"),
+    **dict.fromkeys((DoubleLaneChange, Slalom, SineWithDwell, StepSteer), ("straight",)),
+}
 
 
 def combination_problems(scenario: Scenario) -> Iterator[Problem]:
     """Yield what does not go together in a scenario whose parts are valid."""
     manoeuvre, road = scenario.manoeuvre, scenario.road
     endless = road.track == "straight" and road.length_m is None
-    if endless and (manoeuvre is None or isinstance(manoeuvre, ConstantSpeed)):
+    if endless and (manoeuvre is None or isinstance(manoeuvre, ConstantSpeed | Mix)):
         yield scenario.problem(("road",), "the straight track needs its length_m")
     if manoeuvre is None:
         return
     name = _NAMES[type(manoeuvre)]
-    wanted = "circle" if isinstance(manoeuvre, ConstantRadius) else "straight"
-    bound = isinstance(manoeuvre, (ConstantRadius, *_STRAIGHT_ONLY))
-    if bound and road.track != wanted:
+    tracks = _TRACKS.get(type(manoeuvre))
+    if tracks is not None and road.track not in tracks:
         given = f"the {road.track} track" if road.track else "a road file"
-        sentence = f"{name} needs the {wanted} track, not {given}"
+        sentence = f"{name} needs the {' or the '.join(tracks)} track, not {given}"
         yield scenario.problem(("manoeuvre", "kind"), sentence)
+    elif isinstance(manoeuvre, Mix):
+        return
     elif scenario.driver.speed_kmh is None:
         yield scenario.problem(("manoeuvre",), f"{name} needs driver.speed_kmh")
     else:

@@ -12,7 +12,7 @@ from cosim.errors import InputError, Place, Problem, did_you_mean
 from cosim.limits import check_metric
 from cosim.scenario.combinations import combination_problems
 from cosim.scenario.messages import problems_of
-from cosim.scenario.overrides import apply_override
+from cosim.scenario.overrides import Override, apply_override, parse_override
 from cosim.scenario.schema import Scenario, json_schema
 from cosim.scenario.source import Key, Source, read
 from cosim.scenario.variants import combine
@@ -36,11 +36,21 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
 
 def load_labelled(path: str | Path, overrides: Sequence[tuple[str, str]]) -> Scenario:
     """Like `load`, each override with the text that a message shall name it by."""
+    parsed = [(parse_override(text, label), label) for text, label in overrides]
+    wrong = [Problem(one, Place(label)) for one, label in parsed if isinstance(one, str)]
+    return load_with(path, [one for one, _ in parsed if isinstance(one, Override)], wrong)
+
+
+def load_with(
+    path: str | Path, overrides: Sequence[Override], wrong: Sequence[Problem] = ()
+) -> Scenario:
+    """Like `load`, with overrides that are values already; `wrong` is what was wrong before."""
     data, source, problems = read(Path(path))
-    for text, label in overrides:
-        problem = apply_override(data, source, text, label)
+    problems += wrong
+    for override in overrides:
+        problem = apply_override(data, source, override)
         if problem is not None:
-            problems.append(Problem(problem, Place(label)))
+            problems.append(Problem(problem, Place(override.label)))
     problems += _file_problems(data, source) + _name_problems(data, source)
     try:
         scenario = Scenario.model_validate(data)

@@ -164,6 +164,17 @@ class Accelerate(Model):
         return self
 
 
+class Mix(Model):
+    """Random accelerating, braking, cornering and swaying from 10 km/h to driver.speed_kmh, or 120
+    km/h.
+    """
+
+    kind: Literal["mix"]
+    seed: int | None = Field(
+        default=None, ge=0, description="of what is driven; the scenario's seed if not given"
+    )
+
+
 Manoeuvre = Annotated[
     ConstantSpeed
     | ConstantRadius
@@ -172,6 +183,7 @@ Manoeuvre = Annotated[
     | SineWithDwell
     | StepSteer
     | Brake
-    | Accelerate,
+    | Accelerate
+    | Mix,
     Field(discriminator="kind"),
 ]

@@ -96,11 +96,11 @@ def _sentence(finding: dict[str, Any], key: Key, schema: dict[str, Any]) -> str:
 def _unknown(name: str, above: str, location: Key, schema: dict[str, Any]) -> str:
     fields = list(_descend(schema, location[:-1]).get("properties", {}))
     sentence = f"'{name}' is not a field of {above or 'a ' + schema['title'].lower()}"
+    if above and name in schema["properties"]:
+        return f"{sentence}; it belongs to the top level"
     for section, entry in schema["properties"].items():
         if name in _resolve(entry, schema).get("properties", {}):
             return f"{sentence}; it belongs to {section}"
-    if above and name in schema["properties"]:
-        return f"{sentence}; it belongs to the top level"
     hint = did_you_mean(name, fields)
     return sentence + (hint or f", which has {', '.join(fields)}")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from dataclasses import dataclass
 from typing import Any, Final
 
 from cosim.scenario.source import Key, Source
@@ -24,18 +26,30 @@ def split_key(text: str) -> Key:
     return tuple(int(part) if part.isdecimal() else part for part in parts)
 
 
-def apply_override(data: dict[str, Any], source: Source, text: str, label: str) -> str | None:
-    """Lay one `key=value` over `data`; return what is wrong with it, or None."""
+@dataclass(frozen=True)
+class Override:
+    """A value for the field at `key`, and the text that a message shall name it by."""
+
+    key: Key
+    value: Any
+    label: str
+
+
+def parse_override(text: str, label: str) -> Override | str:
+    """Return what `key=value` means, or what is wrong with it."""
     dotted, equals, value_text = text.partition("=")
     key = split_key(dotted.strip())
     if not equals or "" in key:
         return "write KEY=VALUE, such as --set driver.style=normal"
     value, message = _parse(value_text)
-    if message is not None:
-        return message
-    message = _insert(data, key, value)
+    return Override(key, value, label) if message is None else message
+
+
+def apply_override(data: dict[str, Any], source: Source, override: Override) -> str | None:
+    """Lay one value over `data`; return what is wrong with it, or None."""
+    message = _insert(data, override.key, deepcopy(override.value))
     if message is None:
-        source.override(key, label)
+        source.override(override.key, override.label)
     return message
 
 

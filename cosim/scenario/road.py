@@ -11,20 +11,21 @@ from cosim.scenario.model import Model, with_unit
 from cosim.scenario.obstacles import Obstacle
 from cosim.scenario.surface import SmoothSurface, Surface, SurfaceName
 
-# Fields that describe one track only
+# Fields that describe some tracks only
 _TRACKS_OWN: Final = {
-    "length_m": "straight",
-    "radius_m": "circle",
-    "angle_deg": "circle",
-    "direction": "circle",
+    "length_m": ("straight", "winding"),
+    "seed": ("winding",),
+    "radius_m": ("circle",),
+    "angle_deg": ("circle",),
+    "direction": ("circle",),
 }
 
 
 class Road(Model):
     """The road: one of the tracks with a surface, or an OpenCRG file."""
 
-    track: Literal["hockenheim", "heilbronn", "rural", "straight", "circle"] | None = Field(
-        default=None, description="layout of the road"
+    track: Literal["hockenheim", "heilbronn", "rural", "straight", "circle", "winding"] | None = (
+        Field(default=None, description="layout of the road")
     )
     surface: Surface = Field(
         default=SmoothSurface(), description="unevenness laid over the track, by name or in full"
@@ -42,8 +43,14 @@ class Road(Model):
         default=None,
         ge=10,
         le=20_000,
-        description="length of the straight track; long enough for the manoeuvre if not given",
+        description="length of the straight track, long enough for the manoeuvre if not given, or "
+        "of the winding one",
         json_schema_extra=with_unit("m"),
+    )
+    seed: int | None = Field(
+        default=None,
+        ge=0,
+        description="seed of the winding track's bends; the scenario's seed if not given",
     )
     radius_m: float | None = Field(
         default=None,
@@ -81,10 +88,13 @@ class Road(Model):
                 "file_road",
                 "surface, obstacles and length_m belong to a track; a road file has its own",
             )
-        for field, track in _TRACKS_OWN.items():
-            if getattr(self, field) is not None and self.track != track:
-                message = "{field} belongs to the {track} track only"
-                raise PydanticCustomError(track, message, {"field": field, "track": track})
+        for field, tracks in _TRACKS_OWN.items():
+            if getattr(self, field) is not None and self.track not in tracks:
+                message = "{field} belongs to the {tracks} track only"
+                names = {"field": field, "tracks": " or the ".join(tracks)}
+                raise PydanticCustomError("track", message, names)
         if self.track == "circle" and self.radius_m is None:
             raise PydanticCustomError("circle", "the circle needs its radius_m")
+        if self.track == "winding" and self.length_m is None:
+            raise PydanticCustomError("winding", "the winding track needs its length_m")
         return self

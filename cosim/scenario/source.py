@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -65,18 +67,25 @@ class Source:
 
 
 def read(
-    path: Path, needs: str = "a scenario needs at least name and road"
+    path: Path, needs: str = "a scenario needs at least name and road", what: str = "scenario"
 ) -> tuple[dict[str, Any], Source, list[Problem]]:
     """Read a YAML file into plain values, its source and the problems that do not stop the reading.
 
-    `needs` ends the message about a file without content.
+    `needs` ends the message about a file without content, `what` is what the file should be.
 
     Raises `InputError` when there is no file, no text or no mapping to go on with.
     """
+    data, source, problems = _read(path, _text(path, what), needs)
+    # What was read is kept, and overrides are laid over copies of it.
+    fresh = replace(source, keys=dict(source.keys), values=dict(source.values), overrides={})
+    return deepcopy(data), fresh, list(problems)
+
+
+@lru_cache(maxsize=64)
+def _read(path: Path, text: str, needs: str) -> tuple[dict[str, Any], Source, list[Problem]]:
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-    text = _text(path)
     source = Source(path=path, lines=text.splitlines())
     problems: list[Problem] = []
     yaml = YAML(typ="safe", pure=True)
@@ -95,15 +104,15 @@ def read(
     return data, source, problems
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, what: str) -> str:
     if not path.exists():
         near = path.parent.iterdir() if path.parent.is_dir() else ()
         beside = [p.name for p in near if p.is_dir() or p.suffix in (".yaml", ".yml")]
         match = nearest(path.name, beside)
         hint = f"; did you mean '{path.parent / match}'?" if match else ""
-        raise InputError(f"{path}: no such scenario file{hint}")
+        raise InputError(f"{path}: no such {what} file{hint}")
     if path.is_dir():
-        raise InputError(f"{path} is a folder, not a scenario file")
+        raise InputError(f"{path} is a folder, not a {what} file")
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:

@@ -1,0 +1,44 @@
+"""The commands of the virtual sensor; heavy packages are imported where they are used."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from cosim.exit_codes import cores, failures_as_exit_codes, one_thread
+
+
+@click.group()
+def sensor() -> None:
+    """Data sets, training and evaluation of the virtual sensor."""
+
+
+@sensor.command()
+@click.argument("recipe", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    metavar="DIR",
+    required=True,
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Where the Parquet files go, one per run; runs that are there already are kept.",
+)
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(1),
+    help="Drive up to N runs at the same time, as many as there are cores by default.",
+)
+def dataset(recipe: Path, out: Path, jobs: int | None) -> None:
+    """Drive the runs of RECIPE, a YAML file, and write them as data for training.
+
+    A run that is in DIR from the same values, scenario and vehicle FMU is not driven again. One
+    that fails is named at the end; the others are written all the same.
+    """
+    one_thread()
+    with failures_as_exit_codes():
+        from cosim.dataset.command import run
+
+        code = run(recipe, out, jobs or cores())
+    sys.exit(code)
