@@ -49,8 +49,10 @@ validation: $(VENV)/test.stamp ## all gates of the vehicle, the slow ones too: d
 	$(BIN)/python -m pip install --quiet -e '.[docs]'
 	$(BIN)/python -m pytest -q tests/test_vehicle*.py tests/test_road*.py --validation docs/validation
 
-dataset: $(VENV)/test.stamp ## the runs behind the published network (about three minutes)
-	$(BIN)/cosim dataset scenarios/datasets/paper.yaml --out $(DATA)
+dataset: $(VENV)/test.stamp ## data/paper, data/own and data/evaluation (about seven minutes); runs that are there are kept
+	for name in paper own evaluation; do \
+	    $(BIN)/cosim sensor dataset scenarios/datasets/$$name.yaml --out data/$$name || exit; \
+	done
 
 train: dataset ## the published network and filter (about 25 minutes on 2 cores); resumes where it was stopped
 	$(BIN)/python -m sensor.baselines.fit --data $(DATA) --recipe sensor/recipes/paper.yaml --out sensor/models

@@ -65,7 +65,7 @@ def test_each_kind_is_told_by_its_content(lag: Path, tmp_path: Path) -> None:
         ("a.txt", b"", "an empty file"),
         ("a.bin", b"\0\1\2\3", "binary data"),
         ("a.so", b"\x7fELF$ROAD_CRG", "a program or library"),
-        ("a.yaml", b"name: x\nruns: [a]\n", "a recipe of a data set (cosim dataset)"),
+        ("a.yaml", b"name: x\nruns: [a]\n", "a recipe of a data set (cosim sensor dataset)"),
         ("a.yaml", b"name: x\ntraining: {}\nruns: {}\n", "a training recipe"),
         ("a.yaml", b"name: x\nloads: []\n", "a variant of the vehicle"),
     ],

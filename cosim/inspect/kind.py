@@ -92,7 +92,7 @@ def _yaml(path: Path, text: str) -> Kind:
     if "runs" in keys and "training" in keys:
         raise _other(path, "a training recipe (python -m sensor.train)")
     if "runs" in keys:
-        raise _other(path, "a recipe of a data set (cosim dataset)")
+        raise _other(path, "a recipe of a data set (cosim sensor dataset)")
     if keys & {"loads", "parameters", "scales"} and "name" in keys:
         raise _other(path, "a variant of the vehicle (vehicle.variants of a scenario)")
     return "scenario"  # whose messages say what is missing
