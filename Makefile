@@ -5,9 +5,13 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= scenarios/paper/hockenheim_normal.yaml --set road.surface=A
 DATA ?= data/paper
+EVALUATION_DATA ?= data/evaluation
+EVALUATION ?= build/evaluation.json
+SEARCH ?= docs/paper/search.json
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
-.PHONY: demo test check fmu cross dataset train validation figures roads benchmarks sanitize clean
+.PHONY: demo test check fmu cross dataset train validation evaluated paper evaluation manoeuvres roads benchmarks sanitize clean
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -60,10 +64,20 @@ train: dataset ## the published network and filter (about 25 minutes on 2 cores)
 	cp build/training/bilstm_w19.onnx sensor/models/bilstm_w19_ideal.onnx
 	cp build/training/training.json sensor/models/bilstm_w19_ideal.json
 
-figures: $(VENV)/test.stamp ## the paper's 29 rows on three surfaces: docs/paper-scenarios.md and the model card (about five minutes)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/measure/paper_rows.py
-	$(BIN)/python -m sensor.model_card --model sensor/models/bilstm_w19_ideal.onnx \
-	    --training sensor/models/bilstm_w19_ideal.json --figures build/figures.json
+evaluated: $(VENV)/test.stamp ## every estimator on the runs of scenarios/datasets/evaluation.yaml; what is known already is kept
+	$(BIN)/cosim sensor dataset scenarios/datasets/evaluation.yaml --out $(EVALUATION_DATA)
+	$(BIN)/cosim sensor evaluate --data $(EVALUATION_DATA) --out $(EVALUATION)
+
+paper: evaluated ## the paper's tables and figures beside ours: docs/paper.md
+	$(BIN)/python -m pip install --quiet -e '.[docs]'
+	$(ONE_THREAD) $(BIN)/python docs/measure/paper.py --evaluation $(EVALUATION) --data $(EVALUATION_DATA) --search $(SEARCH)
+
+evaluation: evaluated ## all estimators on all cases, and the goals: docs/estimators-compared.md
+	$(BIN)/python -m pip install --quiet -e '.[docs]'
+	$(ONE_THREAD) $(BIN)/python docs/measure/estimators.py --evaluation $(EVALUATION) --data $(EVALUATION_DATA)
+
+manoeuvres: $(VENV)/test.stamp ## how the paper's manoeuvres were driven: docs/paper-scenarios.md (about a minute)
+	$(ONE_THREAD) $(BIN)/python docs/measure/manoeuvres.py
 
 roads: $(VENV)/test.stamp ## surfaces, bumpy road and road scenarios: the tables of docs/roads.md (about four minutes)
 	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/surfaces.py
@@ -71,7 +85,7 @@ roads: $(VENV)/test.stamp ## surfaces, bumpy road and road scenarios: the tables
 	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/road_scenarios.py
 
 benchmarks: $(VENV)/test.stamp ## real-time factors, loop overhead beside FMPy's, the network, a batch, the vehicle's instructions (needs valgrind)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/bench_loop.py
+	$(ONE_THREAD) $(BIN)/python tests/benchmarks/bench_loop.py
 	$(BIN)/python tests/benchmarks/bench_sensor.py
 	$(BIN)/python tests/benchmarks/bench_batch.py
 	$(BIN)/python tests/benchmarks/bench_instructions.py

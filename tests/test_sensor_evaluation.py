@@ -6,9 +6,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
+from click.testing import CliRunner
 
+from cosim.cli import main
 from cosim.errors import InputError
-from cosim.evaluation import Plan, evaluate_all, overview, plan, read_before
+from cosim.evaluation.command import read_before
+from cosim.evaluation.evaluate import Content, evaluate_all
+from cosim.evaluation.overview import overview
+from cosim.evaluation.plan import Plan, plan
 from sensor import CHANNELS, OUTPUTS, SensorError, evaluate
 from sensor.baselines import StillWheels
 from sensor.channels import COMMANDS, ROAD, STAGE
@@ -98,26 +103,36 @@ def test_what_cannot_be_evaluated_is_refused(tmp_path: Path) -> None:
         assert part in words
 
 
+def evaluated(
+    chosen: Plan, before: Content | None = None, processes: int = 1, told: list[str] | None = None
+) -> Content:
+    saved: list[Content] = []
+    tell = [].append if told is None else told.append
+    evaluate_all(chosen, before, processes, tell, saved.append)
+    (content,) = saved
+    return content
+
+
 def test_kept_figures_are_those_made_anew(runs: Path) -> None:
     chosen = plan(runs, ["zero", "body_motion"], None)
     told: list[str] = []
-    whole = evaluate_all(chosen, None, 2, told.append)
+    whole = evaluated(chosen, None, 2, told)
     assert (
         sorted(told)
         == ["mix_a_passive_1", "mix_a_passive_2"]
         == [run["name"] for run in whole["runs"]]
     )
-    only_zero = evaluate_all(plan(runs, ["zero"], None), None, 1, told.append)
-    assert evaluate_all(chosen, only_zero, 1, told.append) == whole
+    only_zero = evaluated(plan(runs, ["zero"], None))
+    assert evaluated(chosen, only_zero) == whole
     # Nothing is left to do, so nobody notices a figure that was changed by hand.
     changed = json.loads(json.dumps(whole))
     changed["runs"][0]["figures"]["ideal"]["zero"]["overall"]["rmse"] = 7.0
-    again = evaluate_all(chosen, changed, 1, told.append)
+    again = evaluated(chosen, changed)
     assert again["runs"][0]["figures"]["ideal"]["zero"]["overall"]["rmse"] == 7.0
     # But a run, or an estimator, that is another one is evaluated anew.
     other_run = json.loads(json.dumps(changed))
     other_run["runs"][0]["sha256"] = "another"
-    assert evaluate_all(chosen, other_run, 1, told.append) == whole
+    assert evaluated(chosen, other_run) == whole
     other_estimator = Plan(
         chosen.files,
         chosen.estimators,
@@ -126,15 +141,26 @@ def test_kept_figures_are_those_made_anew(runs: Path) -> None:
             for pair, one in chosen.fingerprints.items()
         },
     )
-    anew = evaluate_all(other_estimator, changed, 1, told.append)
+    anew = evaluated(other_estimator, changed)
     assert anew["runs"] == whole["runs"]
 
 
+def test_broken_off_work_keeps_the_runs_that_are_done(runs: Path) -> None:
+    saved: list[Content] = []
+
+    def interrupt(name: str) -> None:
+        raise KeyboardInterrupt
+
+    chosen = plan(runs, ["zero", "body_motion"], None)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate_all(chosen, None, 1, interrupt, saved.append)
+    (content,) = saved
+    assert [run["name"] for run in content["runs"]] == ["mix_a_passive_2"]  # the longer one
+    assert evaluated(chosen, content) == evaluated(chosen)
+
+
 def test_overview_pools_all_runs(runs: Path) -> None:
-    evaluated = evaluate_all(
-        plan(runs, ["zero", "body_motion"], ["ideal"]), None, 1, lambda name: None
-    )
-    table = overview(evaluated)
+    table = overview(evaluated(plan(runs, ["zero", "body_motion"], ["ideal"])))
     assert table.title.startswith(f"2 runs pooled, {850 - 2 * WARM_UP} samples")
     truth = np.concatenate(
         [read_run(path).truth[WARM_UP:] for path in sorted(runs.glob("*.parquet"))]
@@ -163,3 +189,30 @@ def test_fingerprints_tell_estimators_and_conditions_apart() -> None:
     assert fingerprint("zero", "ideal") == fingerprint("zero", "ideal")
     with pytest.raises(SensorError, match="no estimator"):
         fingerprint("zeru", "ideal")
+
+
+def test_command(runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "build" / "figures.json"
+    arguments = ["sensor", "evaluate", "--data", str(runs), "--out", str(out), "--jobs", "1"]
+    result = CliRunner().invoke(main, [*arguments, "--estimators", "zero,body_motion"])
+    assert result.exit_code == 0, result.output
+    assert "2 runs; figures in" in result.output
+    content = json.loads(out.read_text(encoding="utf-8"))
+    assert content["estimators"] == ["zero", "body_motion"]
+    assert content["conditions"] == ["ideal", "production"]
+    assert content == evaluated(plan(runs, ["zero", "body_motion"], None))
+    before = out.stat().st_mtime_ns
+    wrong = ["--estimators", "zero, body_moton", "--conditions", "nominal"]
+    result = CliRunner().invoke(main, [*arguments, *wrong])
+    assert result.exit_code == 2
+    assert "--estimators: there is no estimator 'body_moton'; did you mean" in result.output
+    assert "--conditions: there is no condition 'nominal'" in result.output
+    assert out.stat().st_mtime_ns == before
+
+
+def test_command_names_a_run_that_cannot_be_read(tmp_path: Path) -> None:
+    (tmp_path / "broken.parquet").write_text("no Parquet")
+    arguments = ["sensor", "evaluate", "--data", str(tmp_path), "--out", str(tmp_path / "f.json")]
+    result = CliRunner().invoke(main, [*arguments, "--estimators", "zero", "--jobs", "1"])
+    assert result.exit_code == 2
+    assert "broken.parquet: it cannot be read as a Parquet file" in result.output

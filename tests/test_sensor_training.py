@@ -12,8 +12,6 @@ from sensor_run import run_of
 from sensor import train as train_module
 from sensor.dataset import Run, write_run
 from sensor.errors import SensorError
-from sensor.metrics import evaluate
-from sensor.model_card import figure_row, main, model_card
 from sensor.recipe import RECIPES, Recipe, RunSelection, TrainingRecipe, read_recipe
 from sensor.runtime import OnnxSensor
 from sensor.training import as_seen, fit, learning_rate, read_parts, train
@@ -111,17 +109,6 @@ def test_train_writes_network_and_record(tmp_path: Path) -> None:
         expected = network(torch.from_numpy(channels[:5])[None]).numpy()[0]
     estimate = onnx_sensor.apply(channels.astype(np.float64), np.full((len(channels), 4), 0.3))
     np.testing.assert_allclose(estimate[4], expected, rtol=0.0, atol=1e-5)
-
-    figures = evaluate(estimate, VALIDATION[0].truth.astype(np.float64))
-    rows = [figure_row("Slalom 18 m at 15 km/h", "smooth", {"network": figures})]
-    (out / "figures.json").write_text(json.dumps(rows))
-    arguments = ["--model", str(out / "bilstm_w5.onnx"), "--training", str(out / "training.json")]
-    result = CliRunner().invoke(main, [*arguments, "--figures", str(out / "figures.json")])
-    assert result.exit_code == 0, result.output
-    card = (out / "bilstm_w5.md").read_text()
-    assert card == model_card("bilstm_w5", record, rows)
-    for part in ("Slalom 18 m at 15 km/h", "1.4; 96.2", "## Limits", "| seed | 1 |", "torch"):
-        assert part in card
 
 
 def test_command_reports_every_problem_and_exits_with_2(tmp_path: Path) -> None:

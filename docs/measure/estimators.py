@@ -1,6 +1,6 @@
 """Every estimator on every case under both measurement conditions: `make evaluation`.
 
-Writes docs/estimators-compared.md and its picture from the evaluation's figures.
+Writes docs/estimators-compared.md, its picture and the model cards from the evaluation's figures.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from cases import CASES, Case
 from evaluated import NAMES, ROOT, SURFACES, Evaluated, Record
 from goals import Goals, best_of
 from markdown_tables import fill, millimetres, percent, table
+from model_cards import write_cards
 from pictures import COLOURS, picture
 
 from sensor.metrics import BANDS, MODES
@@ -53,6 +54,7 @@ def main(evaluation: Path, data: Path) -> None:
         "rows": rows(evaluated),
     }
     fill(PAGE, values)
+    write_cards(evaluated)
 
 
 def cases(evaluated: Evaluated) -> str:

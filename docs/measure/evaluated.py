@@ -44,7 +44,7 @@ class Evaluated:
         self.conditions: Sequence[str] = content["conditions"]
         self.runs: Sequence[Mapping[str, Any]] = content["runs"]
         self.provenance: Mapping[str, str] = content["provenance"]
-        self._scenarios = _paper_scenarios()
+        self._scenarios = scenarios_of_the_paper()
 
     @classmethod
     def read(cls, file: Path) -> Evaluated:
@@ -77,7 +77,7 @@ class Evaluated:
         return self.pooled(self.runs_of(row, surface), condition, estimator)
 
 
-def _paper_scenarios() -> dict[str, str]:
+def scenarios_of_the_paper() -> dict[str, str]:
     """The scenario that stands for each row of the paper's Table 4."""
     from ruamel.yaml import YAML
 

@@ -137,7 +137,7 @@ class Goals:
 def best_of(evaluated: Evaluated) -> str:
     """The network that the goals are held against: the carried one as soon as there is one."""
     order = ("carried", "bilstm_residual_w19", "bilstm_w19")
-    return next(name for name in order if name in evaluated.estimators)
+    return next((name for name in order if name in evaluated.estimators), evaluated.estimators[-1])
 
 
 def _mean(values: Sequence[float]) -> float:

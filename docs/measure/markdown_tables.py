@@ -36,8 +36,8 @@ def filled(template: str, values: Mapping[str, object]) -> str:
     return text.substitute({name: str(value) for name, value in values.items()}).strip()
 
 
-def fill(page: Path, values: Mapping[str, object]) -> None:
-    """Write a page from the template of its name."""
-    text = re.sub(r"\n{3,}", "\n\n", filled(page.name, values)) + "\n"
+def fill(page: Path, values: Mapping[str, object], template: str | None = None) -> None:
+    """Write a page from a template, that of its own name if none is named."""
+    text = re.sub(r"\n{3,}", "\n\n", filled(template or page.name, values)) + "\n"
     page.write_text(text, encoding="utf-8")
     print(f"{page.name}: {len(text.splitlines())} lines", file=sys.stderr)

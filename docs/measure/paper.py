@@ -32,6 +32,7 @@ PAGE = ROOT / "docs" / "paper.md"
 PICTURES = ROOT / "docs" / "paper"
 LAP = "hockenheim_normal_smooth_passive"
 SHOWN = (NETWORK, "fir_w19", "kalman", "carried")
+STEADY = {50.0: "straight_b_050_passive_*", 80.0: "straight_b_080_passive_*"}
 TRAINING, UNSEEN = ("heilbronn_*", "rural_*"), "hockenheim_*"
 SEEN_WINDOWS = (3, 7, 11, 17, 19, 21, 25, 31, 51)
 
@@ -39,12 +40,12 @@ SEEN_WINDOWS = (3, 7, 11, 17, 19, 21, 25, 31, 51)
 @click.command(help=__doc__)
 @click.option("--evaluation", required=True, type=click.Path(exists=True, path_type=Path))
 @click.option("--data", required=True, type=click.Path(exists=True, path_type=Path))
-@click.option("--search", required=True, type=click.Path(exists=True, path_type=Path))
+@click.option("--search", required=True, type=click.Path(path_type=Path))
 def main(evaluation: Path, data: Path, search: Path) -> None:
     """Write the page."""
     evaluated = Evaluated.read(evaluation)
     tables = {surface: Table4(evaluated, surface) for surface in SURFACES}
-    values: Values = {"commit": evaluated.commit, "search": search_text(SearchResults(search))}
+    values: Values = {"commit": evaluated.commit, "search": search_text(search)}
     values |= reading_values(tables["smooth"], tables["class_a"])
     values["projected_smooth"] = tables["smooth"].on_presumed_target()
     for surface, one in tables.items():
@@ -105,8 +106,11 @@ def _rmse(table_4: Table4, rows: list[Any], estimator: str) -> list[float]:
     return [float(table_4.figures(row, estimator)["overall"]["rmse"]) for row in rows]
 
 
-def search_text(results: SearchResults) -> str:
+def search_text(file: Path) -> str:
     """Draw Figures 5 and 6; return the section on the search."""
+    if not file.is_file():
+        return f"There is no `{file.name}`: the search has not been run."
+    results = SearchResults(file)
     results.figure_6(PICTURES / "figure_6.svg")
     best = results.best
     return filled(
@@ -166,15 +170,26 @@ def window_values(data: Path) -> Values:
         training = read_runs(data, [f"{track}_{surface}_passive" for track in TRAINING])
         unseen = read_runs(data, [f"{UNSEEN}_{surface}_passive"])
         sweeps[SURFACES[surface]] = sweep(training, unseen)
-    window_figure(PICTURES / "windows.svg", sweeps)
+    steady = {speed: steady_sweep(data, pattern) for speed, pattern in STEADY.items()}
+    window_figure(PICTURES / "windows.svg", sweeps, steady)
     gains = [
         values[64] - values[19] for one in sweeps.values() for values in (one.raw, one.residual)
     ]
+    named = {f"class B at {speed:.0f} km/h": one for speed, one in steady.items()}
+    at_50 = steady[50.0].raw
     return {
         "seen": seen_table(data),
-        "sweeps": sweep_table(sweeps),
+        "sweeps": sweep_table(sweeps | named),
         "window_gain": f"{max(gains):.1f}",
+        "step_at_50": f"{at_50[21] - at_50[19]:.1f}",
+        "rest_at_50": f"{at_50[64] - at_50[21]:.1f}",
     }
+
+
+def steady_sweep(data: Path, pattern: str) -> Sweep:
+    """Fit on all runs at one speed but the last, and apply the filter to that one."""
+    *training, unseen = read_runs(data, [pattern])
+    return sweep(training, [unseen])
 
 
 def seen_table(data: Path) -> str:
@@ -192,7 +207,7 @@ def sweep_table(sweeps: Mapping[str, Sweep]) -> str:
     lines = [
         [f"{surface}, {what}", *(percent(value) for value in values.values())]
         for surface, found in sweeps.items()
-        for what, values in (("14 channels", found.raw), ("with residuals", found.residual))
+        for what, values in (("wheel speeds", found.raw), ("residuals", found.residual))
     ]
     return table(("surface, channels", *(f"W = {length}" for length in lengths)), lines)
 

@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from pictures import picture
 
+from sensor.baselines.normal_equations import Features, NormalEquations, Samples, Standard
 from sensor.channels import CHANNEL_NAMES, SAMPLE_RATE_HZ
 from sensor.dataset import Run
-from sensor.features import with_residuals
 from sensor.paper.reading import WHEELBASE_M
 
-Array = npt.NDArray[np.float64]
-
-WINDOWS = (3, 7, 11, 17, 19, 21, 25, 31, 51, 64)
-RIDGE = 1e-7  # relative to unit variance
-_LONGEST = max(WINDOWS)
-_CHUNK = 4096
+WINDOWS = (3, 7, 11, 13, 17, 19, 21, 25, 31, 51, 64)
+RIDGE = 1e-7
 _SPEED = CHANNEL_NAMES.index("Car.vx")
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Accuracy [%] of a linear filter on unseen runs, by window [samples], without and with the
-    wheel-speed residuals beside the 14 channels.
+    """Accuracy [%] of a linear filter on unseen runs, by window [samples], with the wheel speeds or
+    with their residuals among the 14 channels.
     """
 
     raw: Mapping[int, float]
@@ -44,67 +39,59 @@ def seen(runs: Sequence[Run], window: int) -> float:
 
 def sweep(training: Sequence[Run], unseen: Sequence[Run]) -> Sweep:
     """Fit the filter for each window on the same samples, and apply it to the unseen runs."""
-    return Sweep(
-        _accuracies(training, unseen, lambda run: run.channels.astype(np.float64)),
-        _accuracies(training, unseen, lambda run: with_residuals(run.channels)),
-    )
+    return Sweep(_accuracies(training, unseen, "raw"), _accuracies(training, unseen, "residual"))
 
 
 def _accuracies(
-    training: Sequence[Run], unseen: Sequence[Run], features: Callable[[Run], Array]
+    training: Sequence[Run], unseen: Sequence[Run], channels: Features
 ) -> dict[int, float]:
-    """One pass for the longest window; a shorter one's equations are a corner of its own."""
-    whole = np.concatenate([features(run) for run in training])
-    mean, deviation = whole.mean(axis=0), whole.std(axis=0)
-
-    def pairs(runs: Sequence[Run]) -> Iterator[tuple[Array, Array]]:
-        for run in runs:
-            yield from _chunks((features(run) - mean) / deviation, run.truth.astype(np.float64))
-
-    width = len(mean)
-    size = _LONGEST * width + 1
-    gram, moment, count = np.zeros((size, size)), np.zeros((size, 4)), 0
-    for rows, truth in pairs(training):
-        gram += rows.T @ rows
-        moment += rows.T @ truth
-        count += len(rows)
-    weights = {}
+    """One pass for the longest window; a shorter one is not given the oldest samples."""
+    seen_samples = Samples(training, channels=channels)
+    standard = Standard.of(seen_samples)
+    fitted = NormalEquations.of(seen_samples, max(WINDOWS), standard)
+    checked = NormalEquations.of(Samples(unseen, channels=channels), max(WINDOWS), standard)
+    nothing = np.zeros_like(checked.moment)
+    nothing[-1] = -standard.output_mean / standard.output_std
+    truth = np.square(checked.rmse(nothing)).mean()
+    found = {}
     for window in WINDOWS:
-        first = (_LONGEST - window) * width  # oldest sample first, the constant last
-        part = gram[first:, first:] + RIDGE * count * np.eye(size - first)
-        weights[window] = np.zeros((size, 4))
-        weights[window][first:] = np.linalg.solve(part, moment[first:])
-    stacked = np.concatenate(list(weights.values()), axis=1)
-    errors, truths = np.zeros(len(WINDOWS)), 0.0
-    for rows, truth in pairs(unseen):
-        error = (rows @ stacked).reshape(len(rows), len(WINDOWS), -1) - truth[:, np.newaxis]
-        errors += np.square(error).sum(axis=(0, 2))
-        truths += np.square(truth).sum()
-    return dict(zip(WINDOWS, 100.0 * (1.0 - np.sqrt(errors / truths)), strict=True))
+        weights = _shortened(fitted, window).solve(RIDGE)
+        error = np.square(checked.rmse(weights)).mean()
+        found[window] = 100.0 * (1.0 - float(np.sqrt(error / truth)))
+    return found
 
 
-def _chunks(x: Array, truth: Array) -> Iterator[tuple[Array, Array]]:
-    """Yield the longest windows, flat and with a constant, and the truth at their last samples."""
-    windows = np.lib.stride_tricks.sliding_window_view(x, _LONGEST, axis=0).transpose(0, 2, 1)
-    for start in range(0, len(windows), _CHUNK):
-        chunk = windows[start : start + _CHUNK]
-        rows = np.ones((len(chunk), chunk[0].size + 1))
-        rows[:, :-1] = chunk.reshape(len(chunk), -1)
-        first = _LONGEST - 1 + start
-        yield rows, truth[first : first + len(rows)]
+def _shortened(equations: NormalEquations, window: int) -> NormalEquations:
+    """Return the equations without the samples that are older than a shorter window."""
+    gone = (equations.window - window) * len(CHANNEL_NAMES)  # oldest sample first
+    gram, moment = equations.gram.copy(), equations.moment.copy()
+    gram[:gone], gram[:, :gone], moment[:gone] = 0.0, 0.0, 0.0
+    return replace(equations, gram=gram, moment=moment)
 
 
-def window_figure(file: Path, sweeps: Mapping[str, Sweep]) -> None:
-    """Draw accuracy against window for each surface."""
-    with picture(file, figsize=(6.4, 3.4)) as (_, axes):
-        for (surface, found), colour in zip(sweeps.items(), ("tab:blue", "tab:red"), strict=False):
+def window_figure(file: Path, laps: Mapping[str, Sweep], steady: Mapping[float, Sweep]) -> None:
+    """Draw accuracy against window: laps by surface, and straight roads by speed [km/h] with their
+    wheelbase delay.
+    """
+    with picture(file, ncols=2, figsize=(8.4, 3.4), sharex=True) as (_, (left, right)):
+        for (surface, found), colour in zip(laps.items(), ("tab:blue", "tab:red"), strict=True):
             for values, style, what in (
-                (found.raw, "o-", "14 channels"),
-                (found.residual, "s--", "with residuals"),
+                (found.raw, "o-", "wheel speeds"),
+                (found.residual, "s--", "residuals"),
             ):
-                label = f"{surface}, {what}"
-                line = list(values.values())
-                axes.plot(list(values), line, style, color=colour, label=label, markersize=3)
-        axes.set(xlabel="window, samples of 10 ms", ylabel="accuracy of the linear filter, %")
-        axes.set(ylim=(30, 100), xlim=(0, 66))
-        axes.legend(fontsize=8, ncols=2)
+                left.plot(*_line(values), style, color=colour, label=f"{surface}, {what}",
+                          markersize=3)  # fmt: skip
+        for (speed, found), colour in zip(steady.items(), ("tab:green", "tab:purple"), strict=True):
+            label = f"class B at {speed:.0f} km/h"
+            right.plot(*_line(found.raw), "o-", color=colour, label=label, markersize=3)
+            delay = WHEELBASE_M / (speed / 3.6) * SAMPLE_RATE_HZ + 1
+            right.axvline(delay, color=colour, linestyle=":", label="its wheelbase delay")
+        left.set(title="laps of Hockenheim", ylabel="accuracy of the linear filter, %")
+        right.set(title="one speed, straight ahead")
+        for axes in (left, right):
+            axes.set(xlabel="window, samples of 10 ms", xlim=(0, 66))
+            axes.legend(fontsize=8, loc="lower right")
+
+
+def _line(values: Mapping[int, float]) -> tuple[list[int], list[float]]:
+    return list(values), list(values.values())
