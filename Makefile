@@ -59,7 +59,6 @@ dataset: $(VENV)/test.stamp ## data/paper, data/own and data/evaluation (about s
 	done
 
 train: dataset ## the published network and filter (about 25 minutes on 2 cores); resumes where it was stopped
-	$(BIN)/python -m sensor.baselines.fit --data $(DATA) --recipe sensor/recipes/paper.yaml --out sensor/models
 	$(BIN)/python -m sensor.train --data $(DATA) --recipe sensor/recipes/paper.yaml --out build/training --resume
 	cp build/training/bilstm_w19.onnx sensor/models/bilstm_w19_ideal.onnx
 	cp build/training/training.json sensor/models/bilstm_w19_ideal.json

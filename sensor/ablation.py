@@ -5,18 +5,18 @@ the full one with their rows and columns left out. A group that another can stan
 than it carries.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from sensor.baselines.fit import FILTERS, equations, pooled
+from sensor.baselines.fit import FILTERS, Shape, equations, pooled
 from sensor.baselines.normal_equations import NormalEquations
+from sensor.baselines.recipe import RIDGES
 from sensor.channels import CHANNEL_NAMES
 from sensor.conditions import Condition
 from sensor.dataset import Run
-from sensor.recipe import FirRecipe
 
 GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
     "IMU accelerations": ("Car.ax", "Car.ay", "Car.az"),
@@ -42,19 +42,19 @@ class Ablation:
 
 def ablation(
     condition: Condition,
-    training: Iterable[Run],
-    evaluation: Iterable[Run],
-    recipe: FirRecipe = FILTERS["fir_residual_w64"],
+    training: Sequence[Run],
+    evaluation: Sequence[Run],
+    shape: Shape = FILTERS["fir_residual_w64"],
+    ridges: Sequence[float] = RIDGES,
 ) -> list[Ablation]:
     """Return the filter with all channels and without each group, in the order of `GROUPS`; each
-    with the ridge of the recipe that suits the evaluation runs best.
+    with the ridge that suits the evaluation runs best.
 
-    The runs are gone through twice, so a generator will not do. Raises SensorError if none is as
-    long as the window.
+    Raises SensorError if no run is as long as the window.
     """
-    fitted, checked = equations(recipe, condition, training, evaluation)
+    fitted, checked = equations(shape, condition, training, evaluation)
     return [
-        _without(group, fitted.without(gone), checked, recipe.ridges)
+        _without(group, fitted.without(gone), checked, ridges)
         for group, gone in [(None, []), *((name, _places(name)) for name in GROUPS)]
     ]
 
@@ -67,7 +67,7 @@ def _without(
     group: str | None,
     fitted: NormalEquations,
     checked: NormalEquations,
-    ridges: tuple[float, ...],
+    ridges: Sequence[float],
 ) -> Ablation:
     errors = min((checked.rmse(fitted.solve(ridge)) for ridge in ridges), key=pooled)
     # The truth's own rms: what is left when every weight is zero and so is the constant in m/s.

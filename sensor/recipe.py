@@ -52,16 +52,6 @@ class TrainingRecipe(_Part):
     threads: int = Field(default=1, ge=1)
 
 
-class FirRecipe(_Part):
-    """The linear filter beside the network; of the ridges (relative to unit variance) the best in
-    validation is kept.
-    """
-
-    window: int = Field(default=19, ge=1)
-    channels: Literal["raw", "residual"] = "raw"
-    ridges: tuple[float, ...] = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
-
-
 class RunSelection(_Part):
     """File stems of the runs as glob patterns, by part; each must match at least one file.
 
@@ -93,7 +83,6 @@ class Recipe(_Part):
     seed: int = Field(default=1, ge=0)
     network: NetworkRecipe = NetworkRecipe()
     training: TrainingRecipe = TrainingRecipe()
-    fir: FirRecipe = FirRecipe()
     runs: RunSelection
 
 

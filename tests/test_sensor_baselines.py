@@ -8,7 +8,7 @@ from sensor_run import run_of
 
 from sensor.ablation import GROUPS, ablation
 from sensor.baselines import FirFilter, StillWheels, Zero
-from sensor.baselines.fit import FILTERS, equations, fit_best, main
+from sensor.baselines.fit import FILTERS, Shape, equations, fit_best, main
 from sensor.baselines.normal_equations import Features, NormalEquations, Samples, Standard
 from sensor.body_motion import BodyMotion
 from sensor.conditions import CONDITIONS, Condition
@@ -16,10 +16,10 @@ from sensor.dataset import Run, write_run
 from sensor.errors import SensorError
 from sensor.features import residuals
 from sensor.metrics import evaluate
-from sensor.recipe import FirRecipe
 
 Array = npt.NDArray[np.float64]
 WINDOW = 5
+RAW = Shape(WINDOW, "raw")
 COMMANDS = np.full((1000, 4), 0.3)
 TRUE_WEIGHTS = np.random.default_rng(7).normal(size=(WINDOW, 14, 4))
 TRUE_BIAS = np.array([0.1, -0.2, 0.3, 0.0])
@@ -52,7 +52,7 @@ def moving_run(name: str, count: int, seed: int) -> Run:
 
 
 def fitted(runs: list[Run], ridge: float = 1e-12) -> FirFilter:
-    return fit_best(FirRecipe(window=WINDOW, ridges=(ridge,)), "ideal", runs, runs)
+    return fit_best(RAW, "ideal", runs, runs, (ridge,))
 
 
 def test_fir_recovers_a_known_filter() -> None:
@@ -64,26 +64,32 @@ def test_fir_recovers_a_known_filter() -> None:
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-def test_normal_equations_against_every_window_written_out(condition: Condition) -> None:
+@pytest.mark.parametrize("floor", [None, 0.5])
+def test_normal_equations_against_every_window_written_out(
+    condition: Condition, floor: float | None
+) -> None:
     samples = Samples([known_run("a", 60, 1), known_run("b", 41, 2)], condition, "residual", 2)
     standard = Standard.of(samples)
-    equations = NormalEquations.of(samples, WINDOW, standard)
+    equations = NormalEquations.of(samples, WINDOW, standard, floor)
     rows, targets = [], []
     for features, truth in samples:
+        weight = 1.0 if floor is None else 1.0 / np.sqrt(np.mean(truth**2) + floor**2)
         x = (features - standard.input_mean) / standard.input_std
         y = (truth - standard.output_mean) / standard.output_std
         for k in range(WINDOW - 1, len(x)):
-            rows.append(np.append(x[k - WINDOW + 1 : k + 1].reshape(-1), 1.0))
-            targets.append(y[k])
+            rows.append(weight * np.append(x[k - WINDOW + 1 : k + 1].reshape(-1), 1.0))
+            targets.append(weight * y[k])
     a, b = np.array(rows), np.array(targets)
-    assert equations.count == len(a) == (1 if condition == "ideal" else 2) * (56 + 37)
+    assert len(a) == (1 if condition == "ideal" else 2) * (56 + 37)
+    assert equations.count == pytest.approx(np.sum(a[:, -1] ** 2))
     np.testing.assert_allclose(equations.gram, a.T @ a, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(equations.moment, a.T @ b, rtol=0.0, atol=1e-9)
     weights = np.random.default_rng(0).normal(size=(a.shape[1], 4))
     error = (a @ weights - b) * standard.output_std
-    np.testing.assert_allclose(equations.rmse(weights), np.sqrt(np.mean(error**2, axis=0)))
+    mean_square = np.sum(error**2, axis=0) / equations.count
+    np.testing.assert_allclose(equations.rmse(weights), np.sqrt(mean_square))
     ridge = 1e-2
-    penalty = ridge * len(a) * np.eye(a.shape[1])
+    penalty = ridge * equations.count * np.eye(a.shape[1])
     penalty[-1, -1] = 0.0
     stacked = np.vstack([a, np.sqrt(penalty)])
     expected = np.linalg.lstsq(stacked, np.vstack([b, np.zeros((a.shape[1], 4))]), rcond=None)[0]
@@ -113,8 +119,7 @@ def test_residual_channels_show_what_raw_ones_hide() -> None:
     training, unseen = [moving_run("a", 900, 1)], moving_run("b", 400, 2)
     errors = {}
     for kind in ("raw", "residual"):
-        recipe = FirRecipe(window=WINDOW, channels=kind, ridges=(1e-3,))
-        fir = fit_best(recipe, "ideal", training, training)
+        fir = fit_best(Shape(WINDOW, kind), "ideal", training, training, (1e-3,))
         estimate = fir.apply(unseen.channels, unseen.commands)
         errors[kind] = evaluate(estimate, unseen.truth.astype(float)).overall.rmse
         assert fir.channels == kind
@@ -123,8 +128,8 @@ def test_residual_channels_show_what_raw_ones_hide() -> None:
 
 def test_ablation_names_the_channels_that_carry_the_truth() -> None:
     training, unseen = [moving_run("a", 900, 1)], [moving_run("b", 400, 2)]
-    recipe = FirRecipe(window=WINDOW, channels="residual", ridges=(1e-9, 1e-6))
-    found = {a.without: a for a in ablation("ideal", training, unseen, recipe)}
+    shape = Shape(WINDOW, "residual")
+    found = {a.without: a for a in ablation("ideal", training, unseen, shape, (1e-9, 1e-6))}
     assert set(found) == {None, *GROUPS}
     whole = found[None]
     assert whole.accuracy > 99.0
@@ -140,9 +145,8 @@ def test_leaving_channels_out_is_fitting_without_them() -> None:
     """Against a fit to runs in which those channels never move."""
     runs = [known_run("a", 300, 1)]
     still = [run_of("a", np.where(np.arange(14) < 3, 1.0, runs[0].channels), runs[0].truth)]
-    recipe = FirRecipe(window=WINDOW, ridges=(1e-6,))
-    full, _ = equations(recipe, "ideal", runs, runs)
-    fewer, _ = equations(recipe, "ideal", still, still)
+    full, _ = equations(RAW, "ideal", runs, runs)
+    fewer, _ = equations(RAW, "ideal", still, still)
     np.testing.assert_allclose(
         full.without([0, 1, 2]).solve(1e-6), fewer.solve(1e-6), rtol=0.0, atol=1e-9
     )
@@ -188,8 +192,7 @@ def test_fir_file_round_trip_and_mismatch(tmp_path: Path) -> None:
 
 def test_best_ridge_is_chosen_in_validation() -> None:
     training, validation = [known_run("a", 300, 1)], [known_run("b", 300, 2)]
-    recipe = FirRecipe(window=WINDOW, ridges=(1e3, 1e-9, 1.0))
-    fir = fit_best(recipe, "ideal", training, validation)
+    fir = fit_best(RAW, "ideal", training, validation, (1e3, 1e-9, 1.0))
     assert fir.training["ridge"] == 1e-9
     assert fir.training["validation_rmse"] < 1e-4
 
@@ -198,7 +201,7 @@ def test_fit_command(tmp_path: Path) -> None:
     for name, seed in (("a", 1), ("b", 2)):
         write_run(tmp_path / f"{name}.parquet", known_run(name, 300, seed))
     recipe = tmp_path / "r.yaml"
-    recipe.write_text("name: t\nruns: {training: [a], validation: [b]}\n")
+    recipe.write_text("{family: fir, name: t, runs: [a, b], hold_out: 2}")
     arguments = ["--data", str(tmp_path), "--recipe", str(recipe), "--out", str(tmp_path / "m")]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
@@ -207,11 +210,27 @@ def test_fit_command(tmp_path: Path) -> None:
     fir = FirFilter.load(tmp_path / "m" / "fir_residual_w64_production.npz")
     assert (fir.window, fir.channels) == (64, "residual")
     assert fir.training["command"].endswith("--recipe r.yaml")
-    assert fir.training["training_runs"] == ["a"]
-    recipe.write_text("name: t\nfirr: {}\nruns: {training: [a], validation: [nothing]}\n")
+    assert (fir.training["training_runs"], fir.training["validation_runs"]) == (1, ["b"])
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("{family: fir, name: t, ridge: 1}", "ridge: Extra inputs are not permitted (got 1)."),
+        ("{family: fir, name: t, runs: [x]}", "'x' matches no Parquet file."),
+        ("{family: fir, name: t, hold_out: 3}", "of 3 runs one is for validation, but there are 1"),
+        ("{family", "it is no valid YAML"),
+    ],
+)
+def test_a_recipe_that_does_not_fit(tmp_path: Path, text: str, sentence: str) -> None:
+    write_run(tmp_path / "a.parquet", known_run("a", 30, 1))
+    recipe = tmp_path / "r.yaml"
+    recipe.write_text(text)
+    arguments = ["--data", str(tmp_path), "--recipe", str(recipe), "--out", str(tmp_path / "m")]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 2
-    assert "firr" in result.output
+    assert sentence in result.output
+    assert "Traceback" not in result.output
 
 
 def test_zero_scores_nothing() -> None:

@@ -4,8 +4,10 @@
 """
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from math import ceil
 from pathlib import Path
 from typing import Final
 
@@ -13,71 +15,64 @@ import click
 import numpy as np
 
 from sensor.baselines.fir import FirFilter
-from sensor.baselines.normal_equations import Array, NormalEquations, Samples, Standard
+from sensor.baselines.normal_equations import (
+    Array,
+    Features,
+    NormalEquations,
+    Samples,
+    Standard,
+)
+from sensor.baselines.recipe import RIDGES, read_fir
 from sensor.channels import CHANNELS, OUTPUTS
 from sensor.conditions import CONDITIONS, Condition
 from sensor.dataset import Run, read_runs
 from sensor.errors import SensorError
 from sensor.provenance import versions
-from sensor.recipe import FirRecipe, read_recipe
 
-FILTERS: Final[Mapping[str, FirRecipe]] = {
-    "fir_w19": FirRecipe(window=19, channels="raw"),
-    "fir_w64": FirRecipe(window=64, channels="raw"),
-    "fir_residual_w19": FirRecipe(window=19, channels="residual"),
-    "fir_residual_w64": FirRecipe(window=64, channels="residual"),
+
+@dataclass(frozen=True)
+class Shape:
+    """A filter's window [samples], and what stands in the places of the wheel speeds."""
+
+    window: int
+    channels: Features
+
+
+FILTERS: Final[Mapping[str, Shape]] = {
+    "fir_w19": Shape(19, "raw"),
+    "fir_w64": Shape(64, "raw"),
+    "fir_residual_w19": Shape(19, "residual"),
+    "fir_residual_w64": Shape(64, "residual"),
 }
 """The filters that are shipped, by name."""
 
-REPEATS: Final = 3  # of each training run with other offsets and noise, in condition production
+FLOOR: Final = 0.004
+"""Truth rms [m/s] far below which runs stop counting more: a run weighs 1 / (rms^2 + FLOOR^2), or
+speed humps would be all that a filter is fitted to.
+"""
+DRAWS: Final = 120
+"""In condition production runs are measured again and again, each time with other offsets and
+noise, until there are that many draws; with few, a filter learns to trust the offsets it has seen.
+"""
 
 
-def fit_best(
-    recipe: FirRecipe,
-    condition: Condition,
-    training: Iterable[Run],
-    validation: Iterable[Run],
-) -> FirFilter:
-    """Solve for each ridge of the recipe and return the filter with the least RMSE in validation,
-    all wheels pooled.
-
-    The runs are gone through twice, so a generator will not do. Raises SensorError if none is as
-    long as the window.
-    """
-    fitted, checked = equations(recipe, condition, training, validation)
-    solutions = [fitted.solve(ridge) for ridge in recipe.ridges]
-    errors = [pooled(checked.rmse(solution)) for solution in solutions]
-    best = int(np.argmin(errors))
-    record = {
-        "condition": condition,
-        "ridge": recipe.ridges[best],
-        "windows": fitted.count,
-        "validation_rmse": errors[best],
-        "training_runs": [run.name for run in training],
-        "validation_runs": [run.name for run in validation],
-        "versions": versions(),
-    }
-    weights, bias = in_physical_units(fitted, solutions[best])
-    return FirFilter(weights, bias, record, recipe.channels)
-
-
-def fit_all(
-    training: Iterable[Run],
-    validation: Iterable[Run],
-    directory: Path,
-    command: str,
-    tell: Callable[[str], None] = lambda line: None,
+def train(
+    data: Path, recipe: Path, out: Path, command: str, tell: Callable[[str], None] = print
 ) -> list[Path]:
-    """Fit every filter of `FILTERS` for both conditions, write `<name>_<condition>.npz` with the
-    `command` that made it, and return the files.
+    """Fit every filter of `FILTERS` for both conditions on a recipe's runs in `data`, write
+    `<name>_<condition>.npz` with the `command` that made it to `out`, and return the files.
+
+    Raises SensorError if the recipe or the data do not fit.
     """
-    directory.mkdir(parents=True, exist_ok=True)
+    settings = read_fir(recipe)
+    training, validation = split(read_runs(data, settings.runs), settings.hold_out)
+    out.mkdir(parents=True, exist_ok=True)
     files = []
-    for name, recipe in FILTERS.items():
+    for name, shape in FILTERS.items():
         for condition in CONDITIONS:
-            fir = fit_best(recipe, condition, training, validation)
-            fir.training["command"] = command
-            path = directory / f"{name}_{condition}.npz"
+            fir = fit_best(shape, condition, training, validation, settings.ridges)
+            fir.training |= {"command": command, "recipe": settings.model_dump(mode="json")}
+            path = out / f"{name}_{condition}.npz"
             fir.save(path)
             error = 1e3 * fir.training["validation_rmse"]
             tell(f"{path}: ridge {fir.training['ridge']:g}, validation {error:.2f} mm/s")
@@ -85,20 +80,61 @@ def fit_all(
     return files
 
 
-def equations(
-    recipe: FirRecipe,
-    condition: Condition,
-    training: Iterable[Run],
-    validation: Iterable[Run],
-) -> tuple[NormalEquations, NormalEquations]:
-    """Return the normal equations over the training and over the validation runs, standardised
-    alike.
+def split(runs: Sequence[Run], hold_out: int) -> tuple[list[Run], list[Run]]:
+    """Return training and validation runs: every `hold_out`-th is for validation. Raises
+    SensorError if there are too few.
     """
-    shown = Samples(training, condition, recipe.channels, REPEATS)
-    unseen = Samples(validation, condition, recipe.channels)
+    validation = list(runs[hold_out - 1 :: hold_out])
+    if not validation:
+        raise SensorError(f"of {hold_out} runs one is for validation, but there are {len(runs)}.")
+    return [run for i, run in enumerate(runs, 1) if i % hold_out], validation
+
+
+def fit_best(
+    shape: Shape,
+    condition: Condition,
+    training: Sequence[Run],
+    validation: Sequence[Run],
+    ridges: Sequence[float] = RIDGES,
+) -> FirFilter:
+    """Solve for each ridge and return the filter with the least RMSE in validation, all wheels
+    pooled and quiet runs weighted as in training; raises SensorError if no run is as long as the
+    window.
+    """
+    fitted, checked = equations(shape, condition, training, validation, FLOOR)
+    solutions = [fitted.solve(ridge) for ridge in ridges]
+    errors = [pooled(checked.rmse(solution)) for solution in solutions]
+    best = int(np.argmin(errors))
+    record = {
+        "condition": condition,
+        "ridge": ridges[best],
+        "floor": FLOOR,
+        "validation_rmse": errors[best],
+        "training_runs": len(training),
+        "validation_runs": [run.name for run in validation],
+        "versions": versions(),
+    }
+    weights, bias = in_physical_units(fitted, solutions[best])
+    return FirFilter(weights, bias, record, shape.channels)
+
+
+def equations(
+    shape: Shape,
+    condition: Condition,
+    training: Sequence[Run],
+    validation: Sequence[Run],
+    floor: float | None = None,
+) -> tuple[NormalEquations, NormalEquations]:
+    """Return the normal equations over the training runs, weighted by FLOOR, and over the
+    validation runs, weighted by `floor` if at all, standardised alike.
+    """
+    shown, unseen = (
+        Samples(runs, condition, shape.channels, ceil(DRAWS / max(len(runs), 1)))
+        for runs in (training, validation)
+    )
     standard = Standard.of(shown)
-    fitted = NormalEquations.of(shown, recipe.window, standard)
-    return fitted, NormalEquations.of(unseen, recipe.window, standard)
+    fitted = NormalEquations.of(shown, shape.window, standard, FLOOR)
+    return fitted, NormalEquations.of(unseen, shape.window, standard, floor)
 
 
 def in_physical_units(fitted: NormalEquations, solution: Array) -> tuple[Array, Array]:
@@ -121,11 +157,9 @@ def pooled(errors: Array) -> float:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Where filters go.")
 def main(data: Path, recipe: Path, out: Path) -> None:
     """Fit; exit code 2 with one sentence per problem if the recipe or the data do not fit."""
+    command = f"python -m sensor.baselines.fit --data {data.name} --recipe {recipe.name}"
     try:
-        runs = read_recipe(recipe).runs
-        training, validation = (read_runs(data, part) for part in (runs.training, runs.validation))
-        command = f"python -m sensor.baselines.fit --data {data.name} --recipe {recipe.name}"
-        fit_all(training, validation, out, command, partial(click.echo, err=True))
+        train(data, recipe, out, command, partial(click.echo, err=True))
     except SensorError as error:
         click.echo(str(error), err=True)
         sys.exit(2)

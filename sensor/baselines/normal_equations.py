@@ -77,7 +77,7 @@ class Standard:
 @dataclass(frozen=True)
 class NormalEquations:
     """Sums over all windows, standardised, constant last: `gram` (p, p), `moment` (p, 4), `square`
-    (4,) of the truth, with p = W * 14 + 1, and `count` windows.
+    (4,) of the truth, with p = W * 14 + 1, and `count` windows; each counts by its run's weight.
     """
 
     window: int
@@ -85,33 +85,42 @@ class NormalEquations:
     gram: Array
     moment: Array
     square: Array
-    count: int
+    count: float
 
     @classmethod
     def of(
-        cls, samples: Iterable[tuple[Array, Array]], window: int, standard: Standard
+        cls,
+        samples: Iterable[tuple[Array, Array]],
+        window: int,
+        standard: Standard,
+        floor: float | None = None,
     ) -> "NormalEquations":
-        """Accumulate over runs; raises SensorError if none is as long as the window."""
+        """Accumulate over runs, each weighted by 1 / (rms(truth)^2 + `floor`^2) [s2/m2] so that
+        quiet runs count too, or all alike without; raises SensorError if none is as long as the
+        window.
+        """
         size = window * len(CHANNELS) + 1
         gram, moment = np.zeros((size, size)), np.zeros((size, len(OUTPUTS)))
-        square, count = np.zeros(len(OUTPUTS)), 0
+        square, count = np.zeros(len(OUTPUTS)), 0.0
         for features, truth in samples:
             windows = len(features) - window + 1
             if windows < 1:
                 continue
             x = (features - standard.input_mean) / standard.input_std
             y = ((truth - standard.output_mean) / standard.output_std)[window - 1 :]
+            mean_square = float(np.mean(np.square(truth)))
+            weight = 1.0 if floor is None else 1.0 / (mean_square + floor**2)
             lagged = [x[lag : lag + windows] for lag in range(window)]
-            sums = np.concatenate([part.sum(axis=0) for part in lagged])
-            gram[:-1, :-1] += _gram(x, window)
+            sums = weight * np.concatenate([part.sum(axis=0) for part in lagged])
+            gram[:-1, :-1] += weight * _gram(x, window)
             gram[:-1, -1] += sums
             gram[-1, :-1] += sums
-            gram[-1, -1] += windows
-            moment[:-1] += np.concatenate([part.T @ y for part in lagged])
-            moment[-1] += y.sum(axis=0)
-            square += np.square(y).sum(axis=0)
-            count += windows
-        if count == 0:
+            gram[-1, -1] += weight * windows
+            moment[:-1] += weight * np.concatenate([part.T @ y for part in lagged])
+            moment[-1] += weight * y.sum(axis=0)
+            square += weight * np.square(y).sum(axis=0)
+            count += weight * windows
+        if count == 0.0:
             raise SensorError(f"no run is as long as the filter's window of {window} samples.")
         return cls(window, standard, gram, moment, square, count)
 

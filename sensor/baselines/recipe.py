@@ -1,0 +1,44 @@
+"""The recipe of the linear filters: one YAML file, read strictly."""
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from sensor.errors import SensorError
+
+RIDGES = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+
+
+class FirRecipe(BaseModel):
+    """Which runs the filters are fitted on: file stems as glob patterns, each of which must match
+    at least one; of the runs, sorted by name, every `hold_out`-th is for validation. Of the
+    `ridges` (relative to unit variance) the best in validation is kept.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    family: Literal["fir"]
+    name: str
+    runs: tuple[str, ...] = Field(default=("*",), min_length=1)
+    hold_out: int = Field(default=12, ge=2)
+    ridges: tuple[float, ...] = Field(default=RIDGES, min_length=1)
+
+
+def read_fir(path: str | Path) -> FirRecipe:
+    """Read a recipe; raises SensorError with one sentence for each entry that does not fit."""
+    try:
+        return FirRecipe.model_validate(YAML(typ="safe").load(Path(path)))
+    except OSError as error:
+        raise SensorError(f"{path}: it cannot be read: {error.strerror}.") from error
+    except YAMLError as error:
+        raise SensorError(f"{path}: it is no valid YAML: {error}") from error
+    except ValidationError as error:
+        lines = [
+            f"{path}: {'.'.join(map(str, problem['loc'])) or 'the file'}: {problem['msg']}"
+            f" (got {problem['input']!r})."
+            for problem in error.errors()
+        ]
+        raise SensorError("\n".join(lines)) from error
