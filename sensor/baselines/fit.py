@@ -48,8 +48,8 @@ FILTERS: Final[Mapping[str, Shape]] = {
 
 FLOOR: Final = 0.03
 """Truth rms [m/s] below which runs hardly count more: a run weighs 1 / (rms^2 + FLOOR^2). With all
-alike, speed humps decide and flat turns are lost; with the networks' 4 mm/s flat turns decide, and the
-filter gives up too much on rough roads.
+alike, speed humps decide and flat turns are lost; with the networks' 4 mm/s flat turns decide, and
+the filter gives up too much on rough roads.
 """
 DRAWS: Final = 120
 """In condition production runs are measured again and again, each time with other offsets and
