@@ -14,6 +14,11 @@ By sample, from the channels and the damper commands:
   Front residuals, a_z, roll and pitch rate, each at `leads` samples after the rear wheel's own
   moment: what came after the front's passage tells more of it than the passage itself.
 
+A car on its suspension is nearly linear: twice the road gives twice the motion. So whatever moves
+with the road is divided by the present level of motion (a slow rms of residuals, a_z, roll and
+pitch rate), and the network's output is multiplied by it: a smooth lane change and a row of bumps
+look alike to the network, and the level itself tells it where the dampers bend.
+
 Every filter is a recursion of first order, so that the same features can be computed inside a
 streaming graph (`sensor.carried.graph`); here they are computed for whole runs.
 """
@@ -31,6 +36,7 @@ Array = npt.NDArray[np.float64]
 
 AX, AY, AZ, ROLL, PITCH, YAW, VX = range(7)
 STEER = (7, 8, 13)
+LEVEL_SIGNALS = 7  # of the line: residuals, a_z, roll and pitch rate
 MEANS = 7  # slow means: relative residual of four wheels, a_z, roll rate, pitch rate
 INTEGRALS = 3  # heave velocity, roll angle, pitch angle
 LINE = 10  # signals in the delay line: four residuals, a_z, roll and pitch rate, a_x, a_y, yaw rate
@@ -43,18 +49,24 @@ class FeatureConfig:
 
     The delay line holds `depth` samples: below wheelbase / (depth / 100 Hz) = 2.1 m/s the delayed
     signals are its oldest. `slip_limit` bounds what a spinning wheel may do to the slow mean of
-    its residual.
+    its residual. A slow mean moves by 1 / (k + `settling`) at first, and by 1 / its time later. The
+    level is 1 where the signals have their `typical` rms [m/s, m/s2, rad/s, rad/s].
     """
 
     wheelbase: float = 2.675
     depth: int = 128
     leads: tuple[int, ...] = (-4, 0, 4, 8, 12)
-    slip_time: float = 5.0
+    slip_time: float = 10.0
     slip_limit: float = 0.02
-    bias_time: float = 8.0
-    heave_time: float = 2.0
-    angle_time: float = 3.0
+    bias_time: float = 30.0
+    settling: float = 2.0
+    heave_time: float = 4.0
+    angle_time: float = 5.0
     least_speed: float = 2.0
+    level_time: float = 1.5
+    least_level: float = 0.02
+    typical: tuple[float, ...] = (0.02, 0.02, 0.02, 0.02, 0.5, 0.03, 0.03)
+    largest: float = 20.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -65,10 +77,11 @@ class FeatureConfig:
             *("az", "RollVel", "PitchVel", "ax", "ay", "YawRate"),
         )
         return (
-            "ax", "ay", "az", "RollVel", "PitchVel", "YawRate", "vx", "1/vx",
+            "ax", "ay", "YawRate", "vx", "1/vx", "log level",
             *(CHANNEL_NAMES[i] for i in STEER),
             *(f"Damper.{w}" for w in wheels),
             *(f"Residual.{w}" for w in wheels),
+            "az", "RollVel", "PitchVel",
             "HeaveVel", "Roll", "Pitch",
             *(f"d {name}" for name in line),
             *(f"d2 {name}" for name in line),
@@ -86,55 +99,81 @@ def features(
     commands: npt.NDArray[np.floating[Any]],
     config: FeatureConfig | None = None,
 ) -> npt.NDArray[np.float32]:
-    """Return the features (samples, `config.count`) of a run from its first sample on: channels
-    (samples, 14) and damper commands (samples, 4), SI units.
+    """Return the features of a run from its first sample on and, as the last column, the level by
+    which the network's output is multiplied: (samples, `config.count` + 1), from channels (samples,
+    14) and damper commands (samples, 4), SI units.
     """
     c = config or FeatureConfig()
     x = np.asarray(channels, dtype=np.float64)
     speed = np.maximum(x[:, [VX]], c.least_speed)
     wheel, free = unbiased(x, speed, c)
-    body = x[:, : YAW + 1].copy()
-    body[:, AZ:YAW] = free
     h = 1.0 / SAMPLE_RATE_HZ
     heave = leaky_integral(free[:, :1], c.heave_time, h)
     angles = leaky_integral(free[:, 1:], c.angle_time, h)
-    source = np.hstack([wheel, free, x[:, [AX, AY, YAW]]])
-    first = np.diff(source, axis=0, prepend=np.zeros((1, LINE)))
+    line = np.hstack([wheel, free, x[:, [AX, AY, YAW]]])
+    first = np.diff(line, axis=0, prepend=np.zeros((1, LINE)))
     second = np.diff(first, axis=0, prepend=np.zeros((1, LINE)))
     delay = c.wheelbase * SAMPLE_RATE_HZ / speed[:, 0]
     delayed = [
-        taken(source[:, DELAYED], np.clip(delay - lead, 0.0, c.depth - 2.0)) for lead in c.leads
+        taken(line[:, DELAYED], np.clip(delay - lead, 0.0, c.depth - 2.0)) for lead in c.leads
     ]
+    level = levels(line[:, :LEVEL_SIGNALS], c)
+    moving = np.hstack([wheel, free, heave, angles, first, second, *delayed]) / level
+    moving /= scales(c)
     parts = [
-        body, x[:, [VX]] / 30.0, 10.0 / speed, x[:, list(STEER)], np.asarray(commands), wheel,
-        heave, angles, first, second, *delayed,
+        x[:, [AX, AY, YAW]], x[:, [VX]] / 30.0, 10.0 / speed, np.log(level), x[:, list(STEER)],
+        np.asarray(commands), np.clip(moving, -c.largest, c.largest), level,
     ]  # fmt: skip
     return np.hstack(parts).astype(np.float32)
+
+
+def scales(c: FeatureConfig) -> Array:
+    """Return the typical size of each moving feature at level 1, (moving,)."""
+    line = np.array([*c.typical, 0.5, 0.5, 0.03])
+    return np.concatenate(
+        [
+            line[:LEVEL_SIGNALS],
+            [0.05, 0.01, 0.01],
+            line,
+            line,
+            np.tile(line[list(DELAYED)], len(c.leads)),
+        ]
+    )
+
+
+def levels(signals: Array, c: FeatureConfig) -> Array:
+    """Return the level of motion (samples, 1): slow rms of the signals (samples, 7) over their
+    typical rms, at least `least_level`.
+    """
+    square = np.square(signals / np.array(c.typical)).mean(axis=1, keepdims=True)
+    return np.sqrt(slow_mean(square, c.level_time, 0.25 * c.level_time) + c.least_level**2)
 
 
 def unbiased(x: Array, speed: Array, c: FeatureConfig) -> tuple[Array, Array]:
     """Return residuals (samples, 4) [m/s] and (a_z, roll rate, pitch rate) without slow means."""
     wheel = residuals(x)
     relative = np.clip(wheel / speed, -c.slip_limit, c.slip_limit)
-    slip = slow_mean(relative, c.slip_time * SAMPLE_RATE_HZ)
+    slip = slow_mean(relative, c.slip_time, c.settling)
     imu = x[:, AZ:YAW]
-    return wheel - slip * speed, imu - slow_mean(imu, c.bias_time * SAMPLE_RATE_HZ)
+    return wheel - slip * speed, imu - slow_mean(imu, c.bias_time, c.settling)
 
 
-def slow_mean(x: Array, samples: float) -> Array:
-    """Mean of all samples so far for the first `samples`, then an exponential one of that length.
+def slow_mean(x: Array, time: float, settling: float) -> Array:
+    """Mean that begins at zero, follows quickly at first and with the time constant `time` later.
 
-    m_k = m_(k-1) + a_k (x_k - m_(k-1)) with a_k = max(1 / (k + 1), 1 / samples).
+    m_k = m_(k-1) + a_k (x_k - m_(k-1)), a_k = max(1 / (k + 1 + n0), 1 / n) with n samples in `time`
+    and n0 in `settling` [s]: at first the mean of all samples and of n0 zeros before them.
     """
     from scipy.signal import lfilter
 
-    first = min(len(x), int(samples))
+    n, n0 = time * SAMPLE_RATE_HZ, settling * SAMPLE_RATE_HZ
+    first = min(len(x), max(int(n - n0), 0))
     mean = np.empty_like(x)
-    mean[:first] = np.cumsum(x[:first], axis=0) / np.arange(1, first + 1)[:, np.newaxis]
+    mean[:first] = np.cumsum(x[:first], axis=0) / (np.arange(1, first + 1) + n0)[:, np.newaxis]
     if first < len(x):
-        a = 1.0 / samples
-        start = (1.0 - a) * mean[first - 1 : first]
-        mean[first:] = lfilter([a], [1.0, a - 1.0], x[first:], axis=0, zi=start)[0]
+        a = 1.0 / n
+        before = mean[first - 1 : first] if first else np.zeros((1, x.shape[1]))
+        mean[first:] = lfilter([a], [1.0, a - 1.0], x[first:], axis=0, zi=(1.0 - a) * before)[0]
     return mean
 
 

@@ -9,6 +9,7 @@ the graph, so any runtime of ONNX needs nothing else. The state:
 |---|---|---|
 | samples | (1, 1) | number of samples so far |
 | means | (1, 7) | slow means of relative residuals (4), a_z, roll rate, pitch rate |
+| energy | (1, 1) | slow mean square of the motion |
 | integrals | (1, 3) | heave velocity, roll angle, pitch angle |
 | line | (depth, 10) | newest first: residuals (4), a_z, roll and pitch rate, a_x, a_y, yaw rate |
 | hidden, cell | (1, 1, units) | the LSTM's |
@@ -33,6 +34,7 @@ from sensor.carried.features import (
     STEER,
     FeatureConfig,
     features,
+    scales,
 )
 from sensor.carried.network import SCALE, CarriedNetwork
 from sensor.carried.runtime import STATES, CarriedSensor
@@ -77,7 +79,7 @@ def build(network: CarriedNetwork, training: Mapping[str, Any]) -> onnx.ModelPro
     """Build the streaming graph with features, normalisation and metadata."""
     c, units = network.config.features, network.config.units
     shapes = {
-        "samples": [1, 1], "means": [1, MEANS], "integrals": [1, INTEGRALS],
+        "samples": [1, 1], "energy": [1, 1], "means": [1, MEANS], "integrals": [1, INTEGRALS],
         "line": [c.depth, LINE], "hidden": [1, 1, units], "cell": [1, 1, units],
     }  # fmt: skip
 
@@ -180,8 +182,10 @@ def _slow() -> list[NodeProto]:
     return [
         _node("Max", "vx least_speed", "speed"),
         _node("Add", "samples one", "next_samples"),
-        _node("Div", "one next_samples", "part_of_all"),
-        _node("Max", "part_of_all mean_rates", "rates"),
+        _node("Add", "next_samples zeros_before", "all_samples"),
+        _node("Div", "one all_samples", "part_of_all"),
+        _node("Max", "part_of_all slowest_rates", "all_rates"),
+        _node("Split", "all_rates rate_split", "rates energy_rate", axis=1),
         _node("Div", "residual speed", "relative"),
         _node("Clip", "relative slip_least slip_most", "relative_clipped"),
         _node("Gather", "measured i_free", "imu", axis=1),
@@ -210,6 +214,15 @@ def _delay() -> list[NodeProto]:
         _node("Sub", "difference difference_before", "second_difference"),
         _node("Slice", "line line_first line_last", "line_kept"),
         _node("Concat", "source line_kept", "next_line", axis=0),
+        _node("Concat", "wheel free", "level_signals", axis=1),
+        _node("Div", "level_signals typical", "level_parts"),
+        _node("Mul", "level_parts level_parts", "level_squares"),
+        _node("ReduceMean", "level_squares", "energy_now", axes=[1], keepdims=1),
+        _node("Sub", "energy_now energy", "energy_news"),
+        _node("Mul", "energy_news energy_rate", "energy_gained"),
+        _node("Add", "energy energy_gained", "next_energy"),
+        _node("Add", "next_energy least_energy", "energy_kept_up"),
+        _node("Sqrt", "energy_kept_up", "level"),
         _node("Div", "wheelbase_samples speed", "delay"),
         _node("Sub", "delay leads", "age_free"),
         _node("Clip", "age_free age_least age_most", "age"),
@@ -233,14 +246,22 @@ def _delay() -> list[NodeProto]:
 def _assembled() -> list[NodeProto]:
     """All features in their order, standardised."""
     return [
-        _node("Concat", "ax ay free yaw", "body_free", axis=1),
         _node("Div", "vx speed_unit", "vx_feature"),
         _node("Div", "slowness_unit speed", "slowness"),
+        _node("Log", "level", "log_level"),
         _node("Gather", "measured i_steer", "steer", axis=1),
         _node(
             "Concat",
-            "body_free vx_feature slowness steer command wheel next_integrals difference "
-            "second_difference delayed",
+            "wheel free next_integrals difference second_difference delayed",
+            "moving",
+            axis=1,
+        ),
+        _node("Div", "moving level", "moving_level"),
+        _node("Div", "moving_level moving_scales", "moving_free"),
+        _node("Clip", "moving_free moving_least moving_most", "moving_clipped"),
+        _node(
+            "Concat",
+            "ax ay yaw vx_feature slowness log_level steer command moving_clipped",
             "features",
             axis=1,
         ),
@@ -267,11 +288,13 @@ def _recurrent(units: int) -> list[NodeProto]:
         _node("Gemm", "hidden_layer output_W output_B", "bent", transB=1),
         _node("Gemm", "standardised straight_W", "straight", transB=1),
         _node("Add", "bent straight", "velocity"),
-        _node("Mul", "velocity scale", "estimate"),
+        _node("Mul", "velocity scale", "velocity_scaled"),
+        _node("Mul", "velocity_scaled level", "estimate"),
         _node("Gemm", "hidden_layer deviation_W deviation_B", "deviation_sum", transB=1),
         _node("Clip", "deviation_sum deviation_least deviation_most", "log_deviation"),
         _node("Exp", "log_deviation", "deviation_ratio"),
-        _node("Mul", "deviation_ratio deviation_scale", "deviation"),
+        _node("Mul", "deviation_ratio deviation_scale", "deviation_scaled"),
+        _node("Mul", "deviation_scaled level", "deviation"),
     ]
 
 
@@ -279,14 +302,18 @@ def _feature_constants(c: FeatureConfig) -> Arrays:
     g, s = Geometry(), Slip()
     y = np.array([g.left_y, g.right_y, g.left_y, g.right_y])
     h = 1.0 / SAMPLE_RATE_HZ
-    slow = [c.slip_time] * 4 + [c.bias_time] * 3
+    slow = [c.slip_time] * 4 + [c.bias_time] * 3 + [c.level_time]
+    settling = [c.settling] * 7 + [0.25 * c.level_time]
     reals = {
         "wheel_y": y, "ones": [[1.0, 1.0]], "one": [[1.0]], "per_ax": s.per_ax,
         "per_ay": -s.per_ay * np.sign(y),
         "axle": 1.0 + np.array([s.front, s.front, s.rear, s.rear]),
         "residual_least": -s.limit, "residual_most": s.limit,
         "slip_least": -c.slip_limit, "slip_most": c.slip_limit, "least_speed": c.least_speed,
-        "mean_rates": [[h / time for time in slow]],
+        "slowest_rates": [[h / time for time in slow]],
+        "zeros_before": [[time / h for time in settling]],
+        "typical": c.typical, "least_energy": c.least_level**2,
+        "moving_scales": scales(c), "moving_least": -c.largest, "moving_most": c.largest,
         "integral_keep": 1.0 - h / np.array([c.heave_time, c.angle_time, c.angle_time]),
         "sample_time": h, "wheelbase_samples": c.wheelbase * SAMPLE_RATE_HZ,
         "leads": np.array([c.leads]), "age_least": 0.0, "age_most": c.depth - 2.0,
@@ -295,8 +322,8 @@ def _feature_constants(c: FeatureConfig) -> Arrays:
     wholes = {
         "i_ax": [0], "i_ay": [1], "i_free": [2, 3, 4], "i_yaw": [5], "i_vx": [6],
         "i_road_wheels": [7, 8], "i_wheel_speeds": WHEEL_SPEEDS, "i_steer": STEER,
-        "i_delayed": DELAYED, "first_row": [0], "second_row": [1], "mean_split": [4, 3],
-        "line_first": [0], "line_last": [c.depth - 1],
+        "i_delayed": DELAYED, "first_row": [0], "second_row": [1],
+        "mean_split": [4, 3], "rate_split": [7, 1], "line_first": [0], "line_last": [c.depth - 1],
         "column": [-1, 1], "flat": [-1], "row": [1, -1], "one_row": [1], "first_axis": [0],
     }  # fmt: skip
     return {

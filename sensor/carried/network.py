@@ -13,7 +13,7 @@ from torch import Tensor, nn
 
 from sensor.carried.features import FeatureConfig
 
-SCALE = 0.05  # m/s: what one unit of the output layer stands for
+SCALE = 0.05  # m/s: what one unit of the output layer stands for at level 1
 State = tuple[Tensor, Tensor]
 
 
@@ -35,7 +35,8 @@ class CarriedConfig:
 
 
 class CarriedNetwork(nn.Module):
-    """Maps features (time, batch, count) and a state to velocities and deviations [m/s].
+    """Maps features and level (time, batch, count + 1) and a state to velocities and deviations
+    [m/s].
 
     The buffers `mean`, `std` (count,) hold the normalisation, `calibration` (4,) the factors of the
     deviation found on validation runs.
@@ -61,9 +62,10 @@ class CarriedNetwork(nn.Module):
 
     def forward(self, features: Tensor, state: State | None = None) -> tuple[Tensor, Tensor, State]:
         """Return velocities, deviations (time, batch, 4) [m/s] and the next state."""
-        x = (features - self.mean) / self.std
+        level = SCALE * features[..., -1:]
+        x = (features[..., :-1] - self.mean) / self.std
         ahead, state = self.lstm(torch.tanh(self.front(x)), state)
         hidden = torch.relu(self.hidden(ahead))
-        velocity = SCALE * (self.output(hidden) + self.straight(x))
+        velocity = level * (self.output(hidden) + self.straight(x))
         log_deviation = self.log_deviation(hidden.detach()).clamp(-6.0, 3.0)
-        return velocity, SCALE * torch.exp(log_deviation) * self.calibration, state
+        return velocity, level * torch.exp(log_deviation) * self.calibration, state

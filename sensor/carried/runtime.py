@@ -14,7 +14,7 @@ from sensor.errors import SensorError
 from sensor.runtime import open_session, read_info
 from sensor.window import check_sample
 
-STATES = ("samples", "means", "integrals", "line", "hidden", "cell")
+STATES = ("samples", "energy", "means", "integrals", "line", "hidden", "cell")
 WARM_UP = 50  # samples until the carried state has settled and an estimate counts
 
 Array = npt.NDArray[np.float64]

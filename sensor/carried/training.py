@@ -28,6 +28,7 @@ DEVIATION_SHARE = (
 )
 COVERAGE, SIGMAS = 0.90, 1.645  # of a normal distribution
 LARGEST_GRADIENT = 1.0
+LEAST_DEVIATION = 1e-6  # m/s
 
 
 @dataclass
@@ -116,11 +117,10 @@ class Trainer:
 
     def _normalise(self) -> None:
         """Mean and deviation of the features over all training samples, run by run."""
-        count = sum(len(s.features) for s in self._sequences)
-        mean = sum(s.features.sum(axis=0, dtype=np.float64) for s in self._sequences) / count
-        square = sum(
-            np.square(s.features - mean).sum(axis=0, dtype=np.float64) for s in self._sequences
-        )
+        parts = [s.features[:, :-1] for s in self._sequences]  # without the level
+        count = sum(len(part) for part in parts)
+        mean = sum(part.sum(axis=0, dtype=np.float64) for part in parts) / count
+        square = sum(np.square(part - mean).sum(axis=0, dtype=np.float64) for part in parts)
         std = np.sqrt(square / count)
         std[std < 1e-9] = 1.0
         self.network.mean.copy_(torch.from_numpy(np.asarray(mean, dtype=np.float32)))
@@ -153,6 +153,7 @@ class Trainer:
         weight = torch.from_numpy(chunk.weight)
         error = velocity - torch.from_numpy(chunk.truth)
         square = (error * weight).square().mean()
+        deviation = deviation.clamp_min(LEAST_DEVIATION)  # filled-up places have level 0
         likely = torch.log(deviation) + 0.5 * (error.detach() / deviation).square()
         loss = square + DEVIATION_SHARE * (likely * (weight > 0)).mean()
         self.optimiser.zero_grad()
