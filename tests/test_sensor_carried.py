@@ -96,9 +96,12 @@ def test_slow_mean_starts_as_the_mean_of_all() -> None:
 
 def test_age_between_samples() -> None:
     source = np.arange(1.0, 11.0)[:, None]
-    assert taken(source, np.full(10, 2.5))[:, 0] == pytest.approx(
-        [0, 0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]
-    )
+    assert taken(source, np.full(10, 2.5))[4:, 0] == pytest.approx([2.5, 3.5, 4.5, 5.5, 6.5, 7.5])
+    assert taken(source, np.full(10, 3.0))[:, 0] == pytest.approx([0, 0, 0, 1, 2, 3, 4, 5, 6, 7])
+    t = np.arange(200) / 100.0
+    wave = np.sin(2 * np.pi * 10.0 * t)[:, None]
+    late = np.sin(2 * np.pi * 10.0 * (t - 0.0637))
+    assert taken(wave, np.full(200, 6.37))[20:, 0] == pytest.approx(late[20:], abs=0.01)
 
 
 def test_the_graph_streams_what_torch_computes(tmp_path: Path) -> None:

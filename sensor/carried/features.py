@@ -55,7 +55,7 @@ class FeatureConfig:
 
     wheelbase: float = 2.675
     depth: int = 128
-    leads: tuple[int, ...] = (-4, 0, 4, 8, 12)
+    leads: tuple[int, ...] = (-4, -2, 0, 1, 2, 3, 4, 5, 6, 8, 10, 12)
     slip_time: float = 10.0
     slip_limit: float = 0.02
     bias_time: float = 30.0
@@ -115,7 +115,7 @@ def features(
     second = np.diff(first, axis=0, prepend=np.zeros((1, LINE)))
     delay = c.wheelbase * SAMPLE_RATE_HZ / speed[:, 0]
     delayed = [
-        taken(line[:, DELAYED], np.clip(delay - lead, 0.0, c.depth - 2.0)) for lead in c.leads
+        taken(line[:, DELAYED], np.clip(delay - lead, 0.0, c.depth - 3.0)) for lead in c.leads
     ]
     level = levels(line[:, :LEVEL_SIGNALS], c)
     moving = np.hstack([wheel, free, heave, angles, first, second, *delayed]) / level
@@ -188,12 +188,30 @@ def leaky_integral(x: Array, time: float, h: float) -> Array:
 
 
 def taken(source: Array, age: Array) -> Array:
-    """Return each row of `source` (samples, n) as it was `age` (samples,) samples ago, linear in
-    between; before the start there was nothing.
+    """Return each row of `source` (samples, n) as it was `age` (samples,) samples ago; before the
+    start there was nothing.
+
+    Cubic (Lagrange) between four samples, two on each side: linear interpolation halfway between
+    samples would take 41 % off a motion of 30 Hz, this takes 22 %. Of the newest sample, which has
+    no newer one beside it, the nearest serves.
     """
     whole = np.floor(age).astype(np.int64)
     part = (age - whole)[:, np.newaxis]
-    newer = np.arange(len(source)) - whole
+    now = np.arange(len(source))
     padded = np.vstack([np.zeros((1, source.shape[1])), source])
-    near, far = (padded[np.maximum(i + 1, 0)] for i in (newer, newer - 1))
-    return np.asarray(near * (1.0 - part) + far * part)
+    result = np.zeros((len(source), source.shape[1]))
+    for step, weight in zip((-1, 0, 1, 2), lagrange(part), strict=True):
+        back = np.maximum(whole + step, 0)
+        result += weight * padded[np.maximum(now - back + 1, 0)]
+    return result
+
+
+def lagrange(part: Array) -> tuple[Array, Array, Array, Array]:
+    """Weights of the samples at -1, 0, 1 and 2 for a place `part` (0 to 1) after 0."""
+    p = part
+    return (
+        p * (1.0 - p) * (p - 2.0) / 6.0,
+        (p + 1.0) * (p - 1.0) * (p - 2.0) / 2.0,
+        (p + 1.0) * p * (2.0 - p) / 2.0,
+        (p + 1.0) * p * (p - 1.0) / 6.0,
+    )

@@ -229,17 +229,44 @@ def _delay() -> list[NodeProto]:
         _node("Floor", "age", "age_whole"),
         _node("Sub", "age age_whole", "age_part"),
         _node("Reshape", "age_part column", "part"),
-        _node("Sub", "one part", "rest"),
-        _node("Reshape", "age_whole flat", "newer_number"),
-        _node("Cast", "newer_number", "newer", to=TensorProto.INT64),
-        _node("Add", "newer one_row", "older"),
+        *_lagrange(),
+        _node("Reshape", "age_whole flat", "number_real"),
+        _node("Cast", "number_real", "number", to=TensorProto.INT64),
+        _node("Sub", "number one_row", "number_before"),
+        _node("Max", "number_before no_row", "newer"),
+        _node("Add", "number one_row", "older"),
+        _node("Add", "number two_rows", "oldest"),
         _node("Gather", "next_line i_delayed", "delayed_signals", axis=1),
-        _node("Gather", "delayed_signals newer", "near", axis=0),
-        _node("Gather", "delayed_signals older", "far", axis=0),
-        _node("Mul", "near rest", "near_part"),
-        _node("Mul", "far part", "far_part"),
-        _node("Add", "near_part far_part", "delayed_rows"),
+        *(
+            node
+            for place, row in enumerate(("newer", "number", "older", "oldest"))
+            for node in (
+                _node("Gather", f"delayed_signals {row}", f"rows{place}", axis=0),
+                _node("Mul", f"rows{place} weight{place}", f"share{place}"),
+            )
+        ),
+        _node("Sum", "share0 share1 share2 share3", "delayed_rows"),
         _node("Reshape", "delayed_rows row", "delayed"),
+    ]
+
+
+def _lagrange() -> list[NodeProto]:
+    """Weights of four neighbouring samples: `sensor.carried.features.lagrange`."""
+    return [
+        _node("Add", "part one", "p_after"),
+        _node("Sub", "one part", "p_rest"),
+        _node("Sub", "two part", "p_rest2"),
+        _node("Mul", "part p_rest", "p01"),
+        _node("Mul", "p01 p_rest2", "p012"),
+        _node("Div", "p012 minus_six", "weight0"),
+        _node("Mul", "p_after p_rest", "q01"),
+        _node("Mul", "q01 p_rest2", "q012"),
+        _node("Div", "q012 two", "weight1"),
+        _node("Mul", "p_after part", "r01"),
+        _node("Mul", "r01 p_rest2", "r012"),
+        _node("Div", "r012 two", "weight2"),
+        _node("Mul", "r01 p_rest", "s012"),
+        _node("Div", "s012 minus_six", "weight3"),
     ]
 
 
@@ -316,7 +343,8 @@ def _feature_constants(c: FeatureConfig) -> Arrays:
         "moving_scales": scales(c), "moving_least": -c.largest, "moving_most": c.largest,
         "integral_keep": 1.0 - h / np.array([c.heave_time, c.angle_time, c.angle_time]),
         "sample_time": h, "wheelbase_samples": c.wheelbase * SAMPLE_RATE_HZ,
-        "leads": np.array([c.leads]), "age_least": 0.0, "age_most": c.depth - 2.0,
+        "leads": np.array([c.leads]), "age_least": 0.0, "age_most": c.depth - 3.0,
+        "two": 2.0, "minus_six": -6.0,
         "speed_unit": 30.0, "slowness_unit": 10.0,
     }  # fmt: skip
     wholes = {
@@ -324,7 +352,8 @@ def _feature_constants(c: FeatureConfig) -> Arrays:
         "i_road_wheels": [7, 8], "i_wheel_speeds": WHEEL_SPEEDS, "i_steer": STEER,
         "i_delayed": DELAYED, "first_row": [0], "second_row": [1],
         "mean_split": [4, 3], "rate_split": [7, 1], "line_first": [0], "line_last": [c.depth - 1],
-        "column": [-1, 1], "flat": [-1], "row": [1, -1], "one_row": [1], "first_axis": [0],
+        "column": [-1, 1], "flat": [-1], "row": [1, -1], "first_axis": [0],
+        "no_row": [0], "one_row": [1], "two_rows": [2],
     }  # fmt: skip
     return {
         **{name: np.asarray(value, dtype=np.float32) for name, value in reals.items()},
