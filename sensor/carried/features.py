@@ -15,9 +15,9 @@ By sample, from the channels and the damper commands:
   moment: what came after the front's passage tells more of it than the passage itself.
 
 A car on its suspension is nearly linear: twice the road gives twice the motion. So whatever moves
-with the road is divided by the present level of motion (a slow rms of residuals, a_z, roll and
-pitch rate), and the network's output is multiplied by it: a smooth lane change and a row of bumps
-look alike to the network, and the level itself tells it where the dampers bend.
+with the road is divided by the present level of motion (a slow rms of a_z, roll and pitch rate;
+wheels may slip), and the network's output is multiplied by it: a smooth lane change and a row of
+bumps look alike to the network, and the level itself tells it where the dampers bend.
 
 Every filter is a recursion of first order, so that the same features can be computed inside a
 streaming graph (`sensor.carried.graph`); here they are computed for whole runs.
@@ -36,7 +36,6 @@ Array = npt.NDArray[np.float64]
 
 AX, AY, AZ, ROLL, PITCH, YAW, VX = range(7)
 STEER = (7, 8, 13)
-LEVEL_SIGNALS = 7  # of the line: residuals, a_z, roll and pitch rate
 MEANS = 7  # slow means: relative residual of four wheels, a_z, roll rate, pitch rate
 INTEGRALS = 3  # heave velocity, roll angle, pitch angle
 LINE = 10  # signals in the delay line: four residuals, a_z, roll and pitch rate, a_x, a_y, yaw rate
@@ -49,8 +48,8 @@ class FeatureConfig:
 
     The delay line holds `depth` samples: below wheelbase / (depth / 100 Hz) = 2.1 m/s the delayed
     signals are its oldest. `slip_limit` bounds what a spinning wheel may do to the slow mean of
-    its residual. A slow mean moves by 1 / (k + `settling`) at first, and by 1 / its time later. The
-    level is 1 where the signals have their `typical` rms [m/s, m/s2, rad/s, rad/s].
+    its residual. A slow mean moves by 1 / (k + `settling`) at first (residuals, IMU), by 1 / its
+    time later. The level is 1 where a_z, roll and pitch rate have their `typical` rms.
     """
 
     wheelbase: float = 2.675
@@ -59,13 +58,13 @@ class FeatureConfig:
     slip_time: float = 10.0
     slip_limit: float = 0.02
     bias_time: float = 30.0
-    settling: float = 2.0
+    settling: tuple[float, float] = (0.5, 2.0)
     heave_time: float = 4.0
     angle_time: float = 5.0
     least_speed: float = 2.0
     level_time: float = 1.5
     least_level: float = 0.02
-    typical: tuple[float, ...] = (0.02, 0.02, 0.02, 0.02, 0.5, 0.03, 0.03)
+    typical: tuple[float, float, float] = (0.5, 0.03, 0.03)
     largest: float = 20.0
 
     @property
@@ -117,7 +116,7 @@ def features(
     delayed = [
         taken(line[:, DELAYED], np.clip(delay - lead, 0.0, c.depth - 3.0)) for lead in c.leads
     ]
-    level = levels(line[:, :LEVEL_SIGNALS], c)
+    level = levels(free, c)
     moving = np.hstack([wheel, free, heave, angles, first, second, *delayed]) / level
     moving /= scales(c)
     parts = [
@@ -129,10 +128,10 @@ def features(
 
 def scales(c: FeatureConfig) -> Array:
     """Return the typical size of each moving feature at level 1, (moving,)."""
-    line = np.array([*c.typical, 0.5, 0.5, 0.03])
+    line = np.array([0.02, 0.02, 0.02, 0.02, *c.typical, 0.5, 0.5, 0.03])
     return np.concatenate(
         [
-            line[:LEVEL_SIGNALS],
+            line[:7],
             [0.05, 0.01, 0.01],
             line,
             line,
@@ -142,8 +141,8 @@ def scales(c: FeatureConfig) -> Array:
 
 
 def levels(signals: Array, c: FeatureConfig) -> Array:
-    """Return the level of motion (samples, 1): slow rms of the signals (samples, 7) over their
-    typical rms, at least `least_level`.
+    """Return the level of motion (samples, 1): slow rms of a_z, roll and pitch rate (samples, 3)
+    over their typical rms, at least `least_level`.
     """
     square = np.square(signals / np.array(c.typical)).mean(axis=1, keepdims=True)
     return np.sqrt(slow_mean(square, c.level_time, 0.25 * c.level_time) + c.least_level**2)
@@ -153,9 +152,9 @@ def unbiased(x: Array, speed: Array, c: FeatureConfig) -> tuple[Array, Array]:
     """Return residuals (samples, 4) [m/s] and (a_z, roll rate, pitch rate) without slow means."""
     wheel = residuals(x)
     relative = np.clip(wheel / speed, -c.slip_limit, c.slip_limit)
-    slip = slow_mean(relative, c.slip_time, c.settling)
+    slip = slow_mean(relative, c.slip_time, c.settling[0])
     imu = x[:, AZ:YAW]
-    return wheel - slip * speed, imu - slow_mean(imu, c.bias_time, c.settling)
+    return wheel - slip * speed, imu - slow_mean(imu, c.bias_time, c.settling[1])
 
 
 def slow_mean(x: Array, time: float, settling: float) -> Array:

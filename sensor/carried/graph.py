@@ -214,8 +214,7 @@ def _delay() -> list[NodeProto]:
         _node("Sub", "difference difference_before", "second_difference"),
         _node("Slice", "line line_first line_last", "line_kept"),
         _node("Concat", "source line_kept", "next_line", axis=0),
-        _node("Concat", "wheel free", "level_signals", axis=1),
-        _node("Div", "level_signals typical", "level_parts"),
+        _node("Div", "free typical", "level_parts"),
         _node("Mul", "level_parts level_parts", "level_squares"),
         _node("ReduceMean", "level_squares", "energy_now", axes=[1], keepdims=1),
         _node("Sub", "energy_now energy", "energy_news"),
@@ -330,7 +329,7 @@ def _feature_constants(c: FeatureConfig) -> Arrays:
     y = np.array([g.left_y, g.right_y, g.left_y, g.right_y])
     h = 1.0 / SAMPLE_RATE_HZ
     slow = [c.slip_time] * 4 + [c.bias_time] * 3 + [c.level_time]
-    settling = [c.settling] * 7 + [0.25 * c.level_time]
+    settling = [c.settling[0]] * 4 + [c.settling[1]] * 3 + [0.25 * c.level_time]
     reals = {
         "wheel_y": y, "ones": [[1.0, 1.0]], "one": [[1.0]], "per_ax": s.per_ax,
         "per_ay": -s.per_ay * np.sign(y),

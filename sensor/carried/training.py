@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import torch
 
 from sensor.carried.features import features
@@ -91,8 +92,7 @@ class Trainer:
         torch.set_num_threads(recipe.training.threads)
         torch.manual_seed(recipe.seed)
         self.recipe, self.runs, self.held = recipe, training, validation
-        shape = recipe.network
-        self.network = CarriedNetwork(CarriedConfig(shape.front, shape.units, shape.hidden))
+        self.network = self.build()
         self.optimiser = torch.optim.Adam(
             self.network.parameters(), lr=recipe.training.learning_rate
         )
@@ -100,6 +100,15 @@ class Trainer:
         self._sequences = self._prepared(training, 0)
         self._validation = self._prepared(validation, -1)
         self._normalise()
+
+    def build(self) -> CarriedNetwork:
+        """Return a network of the recipe's shape, its weights drawn."""
+        shape = self.recipe.network
+        return CarriedNetwork(CarriedConfig(shape.front, shape.units, shape.hidden))
+
+    def features(self, run: Run, measured: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+        """Return what the network reads of a run as measured (samples, 14)."""
+        return features(measured, run.commands)
 
     def _prepared(self, runs: Sequence[Run], epoch: int) -> list[Sequence4]:
         """Features of the runs as measured in this epoch."""
@@ -112,7 +121,7 @@ class Trainer:
             measured = run.measured(self.recipe.condition, seed)
             square = float(np.mean(np.square(run.truth)))
             weight = 1.0 / math.sqrt(square + floor**2) if floor else 1.0 / SCALE
-            prepared.append(Sequence4(features(measured, run.commands), run.truth, weight))
+            prepared.append(Sequence4(self.features(run, measured), run.truth, weight))
         return prepared
 
     def _normalise(self) -> None:
