@@ -99,7 +99,7 @@ def outcome(shown: Outcome) -> None:
             err=True,
         )
     if len(shown.runs) == 1:
-        table(estimate_table(shown.runs[0].figures, paper))
+        table(estimate_table(shown.runs[0].figures, paper, shown.metrics["sensor"]))
     else:
         table(comparison_table({one.label: one.figures for one in shown.runs}))
     driven = manoeuvre_table({one.label: one.figures for one in shown.runs})

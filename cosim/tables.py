@@ -75,8 +75,15 @@ def number(value: float | None, digits: int = 4) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def estimate_table(figures: Mapping[str, Any], paper: Mapping[str, Any] | None = None) -> Table:
-    """Return the errors of sensor and baselines at each wheel, and the paper's row if any."""
+def estimate_table(
+    figures: Mapping[str, Any],
+    paper: Mapping[str, Any] | None = None,
+    sensor: Mapping[str, str] | None = None,
+) -> Table:
+    """Return the errors of sensor and baselines at each wheel, and the paper's row if any.
+
+    `sensor` are the settings in metrics.json: its estimator or network, and the condition.
+    """
     columns = (
         "estimate",
         *PARTS,
@@ -103,8 +110,16 @@ def estimate_table(figures: Mapping[str, Any], paper: Mapping[str, Any] | None =
     truth = [figure(figures, f"truth.{part}.rms_m_s") for part in PARTS]
     rows.append(("Truth, rms", *map(number, truth), "", "", ""))
     quiet = truth[-1] is not None and truth[-1] < LEAST_TRUTH_RMS
-    note = f"The truth is below {LEAST_TRUTH_RMS} m/s rms: only the RMSE counts." if quiet else ""
-    return Table("RMSE of the estimate at each wheel [m/s]", columns, tuple(rows), note)
+    notes = [_sensor_note(sensor)] if sensor else []
+    if quiet:
+        notes.append(f"The truth is below {LEAST_TRUTH_RMS} m/s rms: only the RMSE counts.")
+    title = "RMSE of the estimate at each wheel [m/s]"
+    return Table(title, columns, tuple(rows), " ".join(notes))
+
+
+def _sensor_note(sensor: Mapping[str, str]) -> str:
+    name = sensor.get("estimator") or sensor.get("network")
+    return f"Sensor: {name}, channels measured in condition {sensor['condition']}."
 
 
 def comparison_table(runs: Mapping[str, Mapping[str, Any]]) -> Table:

@@ -60,6 +60,12 @@ def test_without_a_valid_sample_there_are_no_figures():
     assert "Truth" in plain(estimate_table({"valid_samples": 0}))
 
 
+def test_the_table_names_the_sensor(figures):
+    settings = {"estimator": "fir_w64", "condition": "production"}
+    note = "Sensor: fir_w64, channels measured in condition production."
+    assert plain(estimate_table(figures, None, settings)).endswith(note)
+
+
 def test_every_promised_metric_is_measured(figures):
     run = {**figures, "comfort": dict.fromkeys(COMFORT_FIGURES, 1.0)}
     for name in metric_names():

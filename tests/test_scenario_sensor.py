@@ -17,7 +17,7 @@ from cosim.errors import InputError
 from cosim.run import execute
 from cosim.scenario.load import load
 from sensor.channels import STAGE
-from sensor.conditions import Measurement
+from sensor.conditions import Condition, Measurement
 from sensor.estimators import make
 
 BUMPS = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 5}"
@@ -88,6 +88,12 @@ def test_the_sensor_in_the_loop_is_the_estimator_on_the_record(
     np.testing.assert_allclose(record.group("estimate"), expected, rtol=0.0, atol=1e-12)
     figures = outcome.runs[0].figures
     assert figures["sensor"] == figures["body_motion"]
+    known: Condition = "ideal" if condition == "ideal" else "production"
+    linear = make("fir_w19", known).apply(record.group("channels"), np.zeros((201, 4)))
+    counted = np.isfinite(linear).all(axis=1)
+    error = (linear - record.group("truth"))[counted]
+    found = figures["fir"]["overall"]["rmse_m_s"]
+    assert found == pytest.approx(np.sqrt(np.mean(np.square(error))))
     assert outcome.metrics["sensor"] == {"estimator": "body_motion", "condition": condition}
 
 

@@ -84,7 +84,7 @@ def _comparison(outcome: Outcome) -> Table | None:
 
 
 def _table(outcome: Outcome, run: RunOutcome) -> Table:
-    return estimate_table(run.figures, outcome.metrics["paper"])
+    return estimate_table(run.figures, outcome.metrics["paper"], outcome.metrics["sensor"])
 
 
 def _signals(run: RunOutcome) -> dict[str, Any]:
