@@ -14,7 +14,7 @@ from sensor.carried.network import CarriedConfig, CarriedNetwork
 from sensor.carried.recipe import CarriedRecipe, Schedule, Shape
 from sensor.carried.runtime import CarriedSensor
 from sensor.carried.streams import Sequence4, Streams
-from sensor.carried.training import Trainer, split
+from sensor.carried.training import Trainer, export_checkpoint, split
 from sensor.channels import CHANNEL_NAMES
 from sensor.dataset import Run
 from sensor.errors import SensorError
@@ -224,6 +224,25 @@ def test_the_deviation_covers_ninety_percent_of_the_runs_held_out() -> None:
         error = np.abs(velocity[:, 0].numpy() - run.truth)[20:]
         inside.append(error < 1.645 * deviation[:, 0].numpy()[20:])
     assert np.concatenate(inside).mean() == pytest.approx(0.90, abs=0.01)
+
+
+def test_a_checkpoint_gives_the_network_of_its_best_epoch(tmp_path: Path) -> None:
+    training, held = split(runs_of_a_known_plant(8, 200), 4)
+    trainer = Trainer(recipe(2), training, held)
+    trainer.save(tmp_path / "c.pt")
+    with pytest.raises(SensorError, match="no epoch"):
+        export_checkpoint(tmp_path / "c.pt", tmp_path / "n.onnx")
+    for epoch in range(2):
+        trainer.run_epoch(epoch)
+    trainer.save(tmp_path / "c.pt")
+    export_checkpoint(tmp_path / "c.pt", tmp_path / "n.onnx")
+    with torch.no_grad():
+        rows = torch.from_numpy(features(held[0].channels, held[0].commands))[:, None]
+        want = trainer.finished()(rows)[1][:, 0].numpy()
+    got = CarriedSensor(tmp_path / "n.onnx").apply_with_deviation(
+        held[0].channels, held[0].commands
+    )[1]
+    assert got[50:] == pytest.approx(want[50:], abs=1e-5)
 
 
 def test_a_checkpoint_of_another_recipe_is_refused(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "carried-study.md"
 RESULTS = ROOT / "docs" / "carried-study.json"
 SEEDS = (1, 2, 3)
-EPOCHS = 8
+EPOCHS = 6
 TRAINING = (
     "straight_passive_*", "straight_switching_*", "mix_passive_*", "mix_more_passive_*",
     "turn_passive_*", "slalom_passive_*", "sine_with_dwell_passive_*", "bumps_passive_*",

@@ -83,6 +83,22 @@ def train(
     return network
 
 
+def export_checkpoint(checkpoint: Path, path: Path) -> None:
+    """Write the best network of a checkpoint as ONNX to `path`; raises SensorError if the file is
+    none of this family.
+    """
+    from sensor.carried.graph import export_carried
+
+    content = torch.load(checkpoint, weights_only=True)
+    recipe = CarriedRecipe.model_validate_json(content["recipe"])
+    shape, reached = recipe.network, Progression(**content["reached"])
+    if not reached.best_weights:
+        raise SensorError(f"{checkpoint}: no epoch has been finished yet.")
+    network = CarriedNetwork(CarriedConfig(shape.front, shape.units, shape.hidden))
+    network.load_state_dict(reached.best_weights)
+    export_carried(network.eval(), path, {"recipe": recipe.model_dump(mode="json")})
+
+
 class Trainer:
     """One training in progress."""
 
@@ -178,7 +194,7 @@ class Trainer:
 
     def _judge(self, epoch: int, training: float, seconds: float) -> None:
         """Record the epoch and keep its weights if its error in validation is the least."""
-        validation = self.validate()
+        validation, calibration = self.validate()
         if not math.isfinite(validation):
             raise SensorError(
                 f"the training diverged in epoch {epoch + 1}; lower the learning rate."
@@ -196,36 +212,29 @@ class Trainer:
             reached.best, reached.best_epoch = validation, epoch + 1
             weights = self.network.state_dict()
             reached.best_weights = {name: value.clone() for name, value in weights.items()}
+            reached.best_weights["calibration"] = calibration
 
     @torch.no_grad()
-    def validate(self) -> float:
-        """Weighted error on the runs held out: rms over runs of rmse / sqrt(rms^2 + floor^2)."""
+    def validate(self) -> tuple[float, torch.Tensor]:
+        """Return the error on the runs held out (rms over runs of their weighted rmse, a ratio),
+        and the factors (4,) with which 90 % of their samples lie within 1.645 predicted deviations.
+        """
         self.network.eval()
-        ratios = []
+        squares, ratios = [], []
+        part = slice(self.recipe.training.warm_up, None)
         for sequence in self._validation:
-            error = self._estimate(sequence)[0] - sequence.truth
-            ratios.append(float(np.mean(np.square(error[self.recipe.training.warm_up :]))))
-            ratios[-1] *= sequence.weight**2
-        return math.sqrt(float(np.mean(ratios)))
-
-    @torch.no_grad()
-    def _estimate(self, sequence: Sequence4) -> tuple[Any, Any]:
-        velocity, deviation, _ = self.network(torch.from_numpy(sequence.features)[:, None])
-        return velocity[:, 0].numpy(), deviation[:, 0].numpy()
+            rows = torch.from_numpy(sequence.features)[:, None]
+            velocity, deviation, _ = self.network(rows)
+            error = (velocity[:, 0].numpy() - sequence.truth)[part]
+            squares.append(float(np.mean(np.square(error))) * sequence.weight**2)
+            ratios.append(np.abs(error) / deviation[part, 0].numpy())
+        factor = np.quantile(np.concatenate(ratios), COVERAGE, axis=0) / SIGMAS
+        return math.sqrt(float(np.mean(squares))), torch.from_numpy(factor.astype(np.float32))
 
     def finished(self) -> CarriedNetwork:
         """Return the network of the best epoch, its deviation calibrated on the runs held out."""
         self.network.load_state_dict(self.reached.best_weights)
-        self.network.eval()
-        self.network.calibration.fill_(1.0)
-        ratios = []
-        for sequence in self._validation:
-            velocity, deviation = self._estimate(sequence)
-            part = slice(self.recipe.training.warm_up, None)
-            ratios.append(np.abs(velocity - sequence.truth)[part] / deviation[part])
-        factor = np.quantile(np.concatenate(ratios), COVERAGE, axis=0) / SIGMAS
-        self.network.calibration.copy_(torch.from_numpy(factor.astype(np.float32)))
-        return self.network
+        return self.network.eval()
 
     def save(self, path: Path) -> None:
         """Write the checkpoint, whole or not at all."""
