@@ -15,7 +15,7 @@ import numpy as np
 from evaluated import NAMES, ROOT, SURFACES, Evaluated
 from markdown_tables import fill, filled, millimetres, percent, table
 from paper_plots import PAPER_BAND, Lap, figure_7, figure_8, reference_and_speed, relative_spectrum
-from paper_tables import NETWORK, Table4
+from paper_tables import NETWORK, SPLITS, Table4
 from search_results import SearchResults
 from windows import Sweep, seen, sweep, window_figure
 
@@ -216,13 +216,19 @@ def difference_values(smooth: Table4) -> Values:
     """Count rows above the paper's RMSE, and compare the references."""
     found = {row: smooth.figures(row)["overall"] for row in paper_rows()}
     worse = [row.scenario for row, ours in found.items() if ours["rmse"] > row.rmse_overall]
+    by_split = {
+        split: [row.scenario for row in paper_rows() if row.split == split] for split in SPLITS
+    }
     ratios = [
         row.truth_rms / ours["truth_rms"] for row, ours in found.items() if row.split == "testing"
     ]
     return {
         "not_worse": len(found) - len(worse),
         "worse": len(worse),
-        "worse_rows": "; ".join(worse) or "none",
+        "worse_by_split": ", ".join(
+            f"{sum(name in worse for name in names)} of {len(names)} {split}"
+            for split, names in by_split.items()
+        ),
         "least_ratio": f"{min(ratios):.1f}",
         "largest_ratio": f"{max(ratios):.0f}",
     }

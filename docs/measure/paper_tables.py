@@ -53,7 +53,7 @@ class Table4:
             rows = [row for row in paper_rows() if split in (row.split, "all")]
             ours = [self.figures(row)["overall"]["accuracy"] for row in rows]
             cell = f"{_mean([row.accuracy for row in rows])} / {_mean(ours)}"
-            lines.append([f"**mean of {len(rows)} {split} rows**", *[""] * 5, cell, ""])
+            lines.append([_mean_of(split, len(rows)), *[""] * 5, cell, ""])
         return lines
 
     def on_the_truth(self) -> str:
@@ -84,7 +84,7 @@ class Table4:
                 for name in self.beside
             )
             paper = _mean([row.accuracy for row in chosen])
-            rows.append([f"**mean of {len(chosen)} {split} rows**", "", paper, *means])
+            rows.append([_mean_of(split, len(chosen)), "", paper, *means])
         heads = ("v_x sin θ₀ alone", *self._heads(self.beside[1:]))
         return table(("row", "target rms", "paper", *heads), rows)
 
@@ -96,6 +96,12 @@ class Table4:
 def _tenth(value: float) -> str:
     """A velocity of the paper in mm/s, with its digits."""
     return f"{1e3 * value:.1f}"
+
+
+def _mean_of(split: str, count: int) -> str:
+    return (
+        f"**mean of all {count} rows**" if split == "all" else f"**mean of {count} {split} rows**"
+    )
 
 
 def _mean(values: Sequence[float]) -> str:
