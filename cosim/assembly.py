@@ -43,7 +43,7 @@ from cosim.sensor import estimator_file, estimator_of, measurement_of, stage_pro
 from cosim.start import builtin_start, checked_parameters
 from cosim.vehicle import Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
-from sensor import CHANNELS, OUTPUTS, SAMPLE_RATE_HZ
+from sensor import CHANNELS, OUTPUTS, SAMPLE_RATE_HZ, Channel
 from sensor.channels import PASSIVE_COMMAND
 from sensor.conditions import PRODUCTION_PARAMETERS, Condition
 
@@ -176,6 +176,7 @@ def record_groups(condition: Condition = "ideal") -> list[tuple[str, list[Signal
     return [
         ("channels", signals(CHANNEL_QUANTITIES)),
         ("estimate", [Signal(o.name, o.unit, o.description) for o in OUTPUTS]),
+        ("deviation", [_deviation(o) for o in OUTPUTS]),
         ("valid", [Signal("VRel.Valid", "", "1 where the estimate is valid")]),
         ("truth", signals(TRUTH)),
         ("command", signals(DAMPERS)),
@@ -183,6 +184,15 @@ def record_groups(condition: Condition = "ideal") -> list[tuple[str, list[Signal
         ("vehicle", signals(RECORDED)),
         ("ideal", ideal if condition != "ideal" else []),
     ]
+
+
+def _deviation(output: Channel) -> Signal:
+    """Return the signal of an output's predicted standard deviation."""
+    wheel = output.name.split(".")[1]
+    about = (
+        f"standard deviation of the error that the sensor expects {wheel}, NaN if it expects none"
+    )
+    return Signal(f"VRel.Deviation.{wheel}", output.unit, about)
 
 
 def checked_parts(

@@ -55,9 +55,12 @@ class MeasurementBlock(Protocol):
 
 
 class SensorBlock(Protocol):
-    """Estimates the suspension velocities."""
+    """Estimates the suspension velocities; `deviation` (4,) [m/s] is the standard deviation that it
+    expects of its error, NaN if it expects none.
+    """
 
     estimate: Array
+    deviation: Array
 
     def step(self, measured: Array, command: Array) -> bool:
         """Take the 14 channels and the damper command (4,) held until now, update `estimate` (4,)
@@ -107,8 +110,9 @@ def run(
         pedals = driver.step(k, state)
         ideal = NOTHING if measured is state.channels else state.channels
         recorder.append(
-            k, measured, sensor.estimate, valid, state.truth, command, pedals, state.recorded, ideal
-        )
+            k, measured, sensor.estimate, sensor.deviation, valid, state.truth,
+            command, pedals, state.recorded, ideal,
+        )  # fmt: skip
         if progress is not None and k % PROGRESS_STEPS == 0:
             progress(k, steps)
         if k == steps or driver.finished:

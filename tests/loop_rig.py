@@ -18,6 +18,7 @@ class Blind:
 
     def __init__(self) -> None:
         self.estimate: Array = np.full(4, np.nan)
+        self.deviation: Array = np.full(4, np.nan)
 
     def step(self, measured: Array, command: Array) -> bool:
         return False
@@ -28,6 +29,7 @@ class Guess:
 
     def __init__(self, window: int = WINDOW) -> None:
         self.estimate: Array = np.full(4, np.nan)
+        self.deviation: Array = np.full(4, np.nan)
         self._missing = window
 
     def step(self, measured: Array, command: Array) -> bool:

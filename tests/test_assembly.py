@@ -310,7 +310,8 @@ def test_the_record_names_every_column_once_with_its_unit() -> None:
     names = [signal.name for signal in signals]
     assert len(set(names)) == len(names)
     assert [name for name, _ in record_groups()] == [
-        "channels", "estimate", "valid", "truth", "command", "driver", "vehicle", "ideal",
+        "channels", "estimate", "deviation", "valid", "truth", "command", "driver", "vehicle",
+        "ideal",
     ]  # fmt: skip
     assert {s.name: s.header for s in signals}["Car.CFL.q0"] == "Car.CFL.q0 [m]"
     assert {s.name: s.header for s in signals}["DM.Gas"] == "DM.Gas"

@@ -42,6 +42,7 @@ class Counter:
 
     def __init__(self, last: int = 10_000, fails_at: int | None = None, error: float = 0.0) -> None:
         self.estimate: Array = np.full(4, np.nan)
+        self.deviation: Array = np.full(4, np.nan)
         self.error = error  # of every measured channel
         self.last, self.fails_at = last, fails_at
         self.calls: list[str] = []
@@ -67,7 +68,7 @@ class Counter:
         counter = self
 
         class Sensor:
-            estimate = counter.estimate
+            estimate, deviation = counter.estimate, counter.deviation
 
             def step(self, measured: Array, command: Array) -> bool:
                 counter.told.append(float(command[0]))
@@ -75,6 +76,7 @@ class Counter:
                 if measured[0] == counter.fails_at:
                     raise FmuError("stop")
                 self.estimate[:] = 100 + measured[0]
+                self.deviation[:] = 500 + measured[0]
                 return bool(measured[0] >= 2)
 
         return Sensor()
@@ -127,8 +129,8 @@ class _CountingDriver:
 
 
 GROUPS = {
-    "channels": 14, "estimate": 4, "valid": 1, "truth": 4, "command": 4, "driver": 3, "vehicle": 14,
-    "ideal": 0,
+    "channels": 14, "estimate": 4, "deviation": 4, "valid": 1, "truth": 4, "command": 4,
+    "driver": 3, "vehicle": 14, "ideal": 0,
 }  # fmt: skip
 
 
@@ -144,8 +146,8 @@ def test_row_k_is_everything_at_t_k() -> None:
     assert run_loop(Counter().blocks(), record, 5) == 5
     k = np.arange(6.0)
     expected = {
-        "channels": k, "estimate": 100 + k, "valid": (k >= 2), "truth": -k, "command": 200 + k,
-        "driver": 300 + k, "vehicle": 10 * k,
+        "channels": k, "estimate": 100 + k, "deviation": 500 + k, "valid": (k >= 2), "truth": -k,
+        "command": 200 + k, "driver": 300 + k, "vehicle": 10 * k,
     }  # fmt: skip
     for name, values in expected.items():
         for column in record.group(name).T:

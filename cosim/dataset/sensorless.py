@@ -13,6 +13,7 @@ class NoSensor:
 
     def __init__(self) -> None:
         self.estimate: Array = np.full(4, np.nan)
+        self.deviation: Array = np.full(4, np.nan)
 
     def step(self, measured: Array, command: Array) -> bool:
         """Return False."""
