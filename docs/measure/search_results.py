@@ -111,7 +111,7 @@ class SearchResults:
             line = [row["relative_duration_percent"] for row in self.paper_shapes]
             times.plot(shapes, line, "^--", color=_OURS, label="the paper's shapes here")
             errors.set(ylabel="relative error, %", ylim=(0, 110))
-            times.set(ylabel="relative duration, %", ylim=(0, None))
+            times.set(ylabel="relative duration, %", yscale="log")
             for axes in (errors, times):
                 axes.set(xlabel="window, samples of 10 ms")
                 axes.legend(fontsize=8)
@@ -120,7 +120,8 @@ class SearchResults:
 def _draw_surface(figure: Any, axes: Any, row: Mapping[str, Any]) -> None:
     surface, trials = row["surface"], row["trials"]
     mean = 1e3 * np.array(surface["mean"])
-    shades = axes.contourf(surface["hidden"], surface["units"], mean, 14, cmap="viridis")
+    levels = np.linspace(mean.min(), max(mean.max(), mean.min() + 0.1), 15)  # however flat it is
+    shades = axes.contourf(surface["hidden"], surface["units"], mean, levels, cmap="viridis")
     figure.colorbar(shades, ax=axes, label="RMSE, mean of the process, mm/s")
     shape = ([trial["hidden"] for trial in trials], [trial["units"] for trial in trials])
     axes.plot(*shape, "o", color="white", markeredgecolor="black", markersize=4)
