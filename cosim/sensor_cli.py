@@ -7,7 +7,9 @@ from pathlib import Path
 
 import click
 
-from cosim.exit_codes import cores, failures_as_exit_codes, one_thread
+from cosim.exit_codes import cores, failures_as_exit_codes, one_thread, threads_that_sleep
+
+_DIRECTORY = click.Path(path_type=Path, file_okay=False)
 
 
 @click.group()
@@ -21,7 +23,7 @@ def sensor() -> None:
     "--out",
     metavar="DIR",
     required=True,
-    type=click.Path(path_type=Path, file_okay=False),
+    type=_DIRECTORY,
     help="Where the Parquet files go, one per run; runs that are there already are kept.",
 )
 @click.option(
@@ -92,3 +94,74 @@ def evaluate(
 def _names(text: str | None) -> list[str] | None:
     """Return the names of a list with commas; None if nothing is named."""
     return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
+
+
+@sensor.command()
+@click.argument("recipe", type=click.Path(path_type=Path))
+@click.option("--data", metavar="DIR", required=True, type=_DIRECTORY, help="Runs (Parquet).")
+@click.option("--out", metavar="DIR", required=True, type=_DIRECTORY, help="Where results go.")
+@click.option("--resume", is_flag=True, help="Go on from the checkpoint in the results' directory.")
+@click.option("--seed", metavar="N", type=click.IntRange(0), help="In place of the recipe's seed.")
+def train(recipe: Path, data: Path, out: Path, resume: bool, seed: int | None) -> None:
+    """Train what RECIPE, a YAML file, describes: checkpoint, training.json and network in DIR.
+
+    A training that was stopped goes on with --resume and ends in the same weights.
+    """
+    threads_that_sleep()
+    with failures_as_exit_codes():
+        from sensor import families
+
+        families.train(families.Training(recipe, data, out, resume, seed))
+
+
+@sensor.command()
+@click.argument("recipe", type=click.Path(path_type=Path))
+@click.option("--data", metavar="DIR", required=True, type=_DIRECTORY, help="Runs (Parquet).")
+@click.option(
+    "--out",
+    metavar="DIR",
+    required=True,
+    type=_DIRECTORY,
+    help="Where the studies and search.json go; a search that is there goes on.",
+)
+@click.option(
+    "--jobs",
+    metavar="N",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1),
+    help="Processes; the same command may also be started several times.",
+)
+@click.option(
+    "--samples",
+    metavar="N",
+    default=1000,
+    show_default=True,
+    type=click.IntRange(1),
+    help="Samples over which the networks' durations are measured at the end.",
+)
+@click.option("--summary", is_flag=True, help="No trials: only the results of those there are.")
+def search(recipe: Path, data: Path, out: Path, jobs: int, samples: int, summary: bool) -> None:
+    """Search the best shape of the network for each window size, as RECIPE says."""
+    threads_that_sleep()
+    with failures_as_exit_codes():
+        from sensor.search import command
+
+        command.run(recipe, data, out, command.Budget(0 if summary else jobs, samples))
+
+
+@sensor.command()
+@click.argument("checkpoint", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--out",
+    metavar="FILE.onnx",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+)
+def export(checkpoint: Path, out: Path) -> None:
+    """Write the best network so far of a training's CHECKPOINT (checkpoint.pt) as ONNX."""
+    with failures_as_exit_codes():
+        from sensor import families
+
+        families.export(checkpoint, out)

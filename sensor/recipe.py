@@ -2,8 +2,9 @@
 read strictly.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from ruamel.yaml import YAML
@@ -129,6 +130,13 @@ class SearchRecipe(_Part):
     stop: EarlyStop | None = None
     training: TrainingRecipe
     runs: RunSelection
+
+    def continues(self, begun: Mapping[str, Any]) -> bool:
+        """Tell whether a search that was `begun` with such a recipe may go on with this one, which
+        may have other windows and more trials.
+        """
+        free = {"windows": self.windows, "trials": self.trials}
+        return type(self).model_validate({**begun, **free}) == self
 
     def trial(self, window: int, units: int, hidden: int) -> Recipe:
         """Return the recipe of one trial."""

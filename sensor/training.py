@@ -7,25 +7,24 @@ the same weights as one that was never interrupted.
 
 import json
 import math
+import pickle
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import torch
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from sensor.conditions import Measurement
-from sensor.dataset import Normalisation, Run, WindowSet, read_runs
+from sensor.dataset import Run, WindowSet
 from sensor.errors import SensorError
-from sensor.features import with_residuals
 from sensor.network import BiLstmNetwork, NetworkConfig
+from sensor.progress import epochs
 from sensor.provenance import versions
-from sensor.recipe import Recipe, RunSelection, TrainingRecipe, read_recipe
+from sensor.recipe import Recipe, TrainingRecipe, read_recipe
+from sensor.training_data import as_seen, read_parts, window_sets
 
 _VALIDATION_BATCH = 2048
 
@@ -42,20 +41,23 @@ class Progression:
     best_weights: dict[str, torch.Tensor] = field(default_factory=dict)
 
 
-def train(data: Path, recipe_path: Path, out: Path, *, resume: bool = False) -> BiLstmNetwork:
+def train(
+    data: Path, recipe_path: Path, out: Path, *, resume: bool = False, seed: int | None = None
+) -> BiLstmNetwork:
     """Train by the recipe on the runs in `data`; write checkpoint, `training.json` and the ONNX
-    network to `out`.
+    network to `out`. `seed` takes the place of the recipe's.
 
     Returns the network of the best epoch. Raises SensorError if recipe or data do not fit.
     """
     from sensor.export import export_windowed
 
     recipe = read_recipe(recipe_path)
+    if seed is not None:
+        recipe = recipe.model_copy(update={"seed": seed})
     training, validation = read_parts(data, recipe.runs)
     out.mkdir(parents=True, exist_ok=True)
     network, record = fit(recipe, training, validation, out, resume=resume)
-    window = recipe.network.window
-    export_windowed(network, out / f"bilstm_w{window}.onnx", training=record)
+    export_windowed(network, out / f"{recipe.name}.onnx", training=record)
     return network
 
 
@@ -68,62 +70,20 @@ def fit(
     if resume:
         trainer.load(out / "checkpoint.pt")
     description = _describe(recipe, training, validation)
-    with _progress() as progress:
-        task = progress.add_task("epoch", total=recipe.training.epochs)
-        for epoch in range(len(trainer.reached.epochs), recipe.training.epochs):
-            progress.update(task, completed=epoch, description=trainer.summary())
+    total = recipe.training.epochs
+    with epochs(total) as tell:
+        for epoch in range(len(trainer.reached.epochs), total):
+            tell(epoch, total, trainer.summary())
             if epoch and recipe.condition != "ideal":  # offsets and gains: other ones every epoch
-                trainer.training = WindowSet(
-                    as_seen(recipe, training, draw=epoch),
-                    recipe.network.window,
-                    trainer.training.normalisation,
-                )
+                seen = as_seen(recipe, training, draw=epoch)
+                normalisation = trainer.training.normalisation
+                trainer.training = WindowSet(seen, recipe.network.window, normalisation)
             trainer.run_epoch(epoch)
             trainer.save(out / "checkpoint.pt")
             _write_json(out / "training.json", description | trainer.record())
-        progress.update(task, completed=recipe.training.epochs, description=trainer.summary())
+        tell(total, total, trainer.summary())
     network.load_state_dict(trainer.reached.best_weights)
     return network.eval(), description | trainer.record()
-
-
-def read_parts(data: Path, selection: RunSelection) -> tuple[list[Run], list[Run]]:
-    """Read the training and the validation runs; raises SensorError if files are missing."""
-    training = read_runs(data, selection.training)
-    if selection.hold_out is None:
-        return training, read_runs(data, selection.validation)
-    step = selection.hold_out
-    if len(training) < step:
-        raise SensorError(
-            f"{data}: of {step} runs one is held out for validation, but there are {len(training)}."
-        )
-    return [run for i, run in enumerate(training, 1) if i % step], training[step - 1 :: step]
-
-
-def window_sets(
-    recipe: Recipe, training: Sequence[Run], validation: Sequence[Run]
-) -> tuple[WindowSet, WindowSet]:
-    """Return the training and the validation windows as the network sees them, both standardised by
-    the training runs.
-    """
-    seen = as_seen(recipe, training), as_seen(recipe, validation)
-    normalisation, window = Normalisation.of(seen[0]), recipe.network.window
-    return WindowSet(seen[0], window, normalisation), WindowSet(seen[1], window, normalisation)
-
-
-def as_seen(recipe: Recipe, runs: Sequence[Run], draw: int = 0) -> list[Run]:
-    """Return the runs with the channels that the network standardises: measured in the recipe's
-    condition, with residuals in place of the wheel speeds where it wants them. Every `draw` has
-    measurement errors of its own.
-    """
-    seen = []
-    for run in runs:
-        seeds = np.random.SeedSequence([recipe.seed, draw, *run.name.encode()])
-        measurement = Measurement(recipe.condition, int(seeds.generate_state(1)[0]))
-        channels = measurement.apply(run.channels, run.stage)
-        if recipe.network.channels == "residual":
-            channels = with_residuals(channels)
-        seen.append(replace(run, channels=channels.astype(np.float32)))
-    return seen
 
 
 class Trainer:
@@ -134,16 +94,7 @@ class Trainer:
         """Begin a training with the initial weights that the recipe's seed gives."""
         torch.set_num_threads(recipe.training.threads)
         torch.manual_seed(recipe.seed)
-        shape = recipe.network
-        network = BiLstmNetwork(
-            NetworkConfig(
-                shape.window,
-                units=shape.units,
-                hidden=shape.hidden,
-                dropout=shape.dropout,
-                residual=shape.channels == "residual",
-            )
-        )
+        network = network_of(recipe)
         for name, values in asdict(training.normalisation).items():
             getattr(network, name).copy_(torch.from_numpy(values))
         return cls(recipe, network, training, validation)
@@ -272,6 +223,43 @@ class Trainer:
         }
 
 
+def network_of(recipe: Recipe) -> BiLstmNetwork:
+    """Return a network of the recipe's shape with weights drawn."""
+    shape = recipe.network
+    return BiLstmNetwork(
+        NetworkConfig(
+            shape.window,
+            units=shape.units,
+            hidden=shape.hidden,
+            dropout=shape.dropout,
+            residual=shape.channels == "residual",
+        )
+    )
+
+
+def export_checkpoint(checkpoint: Path, path: Path) -> Path:
+    """Write the best network so far of a training as ONNX; return the path.
+
+    Raises SensorError if the file is no checkpoint of a windowed network.
+    """
+    from sensor.export import export_windowed
+
+    try:
+        content = torch.load(checkpoint, weights_only=True)
+        recipe = Recipe.model_validate_json(content["recipe"])
+        network = network_of(recipe)
+        network.load_state_dict(content["reached"]["best_weights"])
+    except (OSError, KeyError, RuntimeError, ValueError, pickle.UnpicklingError) as error:
+        raise SensorError(
+            f"{checkpoint}: it is no checkpoint of a windowed network ({type(error).__name__})."
+        ) from error
+    record = {"recipe": recipe.model_dump(mode="json"), "versions": versions()}
+    beside = checkpoint.with_name("training.json")
+    if beside.is_file():
+        record = json.loads(beside.read_text(encoding="utf-8"))
+    return export_windowed(network.eval(), path, training=record)
+
+
 def learning_rate(settings: TrainingRecipe, epoch: int) -> float:
     """Learning rate of an epoch (counted from 0) by the recipe's schedule."""
     if settings.schedule == "cosine":
@@ -292,16 +280,6 @@ def _describe(recipe: Recipe, training: Sequence[Run], validation: Sequence[Run]
         for part, runs in (("training", training), ("validation", validation))
     }
     return {"recipe": recipe.model_dump(mode="json"), "versions": versions(), "samples": data}
-
-
-def _progress() -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed}/{task.total}"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

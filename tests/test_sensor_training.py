@@ -14,7 +14,8 @@ from sensor.dataset import Run, write_run
 from sensor.errors import SensorError
 from sensor.recipe import RECIPES, Recipe, RunSelection, TrainingRecipe, read_recipe
 from sensor.runtime import OnnxSensor
-from sensor.training import as_seen, fit, learning_rate, read_parts, train
+from sensor.training import fit, learning_rate, train
+from sensor.training_data import as_seen, read_parts
 
 
 def linear_run(name: str, seed: int) -> Run:

@@ -11,27 +11,25 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from sensor.errors import SensorError
-from sensor.recipe import SearchRecipe, read_search_recipe
+from sensor.recipe import SearchRecipe
 from sensor.search.study import finished, open_storage, open_study, work
 from sensor.search.trial import WindowObjective
-from sensor.training import read_parts
+from sensor.training_data import read_parts
 
 STORAGE = "studies.sqlite3"
 
 
-def search(recipe_path: Path, data: Path, out: Path, *, jobs: int = 1) -> dict[int, Study]:
-    """Do the trials that are missing in `out` and return the study of each window.
+def search(recipe: SearchRecipe, data: Path, out: Path, *, jobs: int = 1) -> None:
+    """Do the trials that are missing in `out`.
 
     Raises SensorError if recipe or data do not fit, or one of the processes failed.
     """
-    recipe = read_search_recipe(recipe_path)
     out.mkdir(parents=True, exist_ok=True)
     studies = open_studies(recipe, out)
     if all(len(finished(study)) >= recipe.trials for study in studies.values()):
-        return studies
+        return
     with _helpers(jobs - 1, recipe, data, out), _progress(recipe, studies) as say:
         _work(recipe, studies, data, say)
-    return studies
 
 
 def open_studies(recipe: SearchRecipe, out: Path) -> dict[int, Study]:

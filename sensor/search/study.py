@@ -101,13 +101,14 @@ def open_study(storage: BaseStorage, recipe: SearchRecipe, window: int) -> Study
         sampler=SeededSampler(space, seed, recipe.startup),
         load_if_exists=True,
     )
-    content = recipe.model_dump(mode="json", exclude={"trials", "windows"})
-    if study.user_attrs.get("recipe", content) != content:
+    begun = study.user_attrs.get("recipe")
+    if begun is None:
+        study.set_user_attr("recipe", recipe.model_dump(mode="json"))
+    elif not recipe.continues(begun):
         raise SensorError(
             f"the search {recipe.name!r} was begun with another recipe; name this one anew, or "
             "choose another directory."
         )
-    study.set_user_attr("recipe", content)
     return study
 
 

@@ -14,7 +14,8 @@ from optuna.trial import Trial
 from sensor.dataset import Run
 from sensor.recipe import EarlyStop, Recipe, SearchRecipe
 from sensor.search.study import finished
-from sensor.training import Trainer, window_sets
+from sensor.training import Trainer
+from sensor.training_data import window_sets
 
 Said = Callable[[str], None]
 

@@ -1,0 +1,105 @@
+"""Which function trains and which writes the network, by the `family` that a recipe names."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Final, TypeVar
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from sensor.errors import SensorError
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Training:
+    """What a training is told: recipe file, directory of the runs, directory of the results,
+    whether to go on from the checkpoint there, and a seed in place of the recipe's.
+    """
+
+    recipe: Path
+    data: Path
+    out: Path
+    resume: bool = False
+    seed: int | None = None
+
+
+def _bilstm(training: Training) -> None:
+    from sensor.training import train
+
+    train(
+        training.data,
+        training.recipe,
+        training.out,
+        resume=training.resume,
+        seed=training.seed,
+    )
+
+
+def _carried(training: Training) -> None:
+    from sensor.carried.recipe import read_carried
+    from sensor.carried.training import train
+    from sensor.progress import epochs
+
+    recipe = read_carried(training.recipe)
+    if training.seed is not None:
+        recipe = recipe.model_copy(update={"seed": training.seed})
+    with epochs(recipe.training.epochs) as tell:
+        train(recipe, training.data, training.out, training.resume, tell)
+
+
+def _export_bilstm(checkpoint: Path, path: Path) -> None:
+    from sensor.training import export_checkpoint
+
+    export_checkpoint(checkpoint, path)
+
+
+TRAIN: Final[Mapping[str, Callable[[Training], None]]] = {"bilstm": _bilstm, "carried": _carried}
+EXPORT: Final[Mapping[str, Callable[[Path, Path], None]]] = {"bilstm": _export_bilstm}
+
+
+def train(training: Training) -> None:
+    """Train by a recipe, whatever its family; raises SensorError if recipe or data do not fit."""
+    _chosen(TRAIN, family_of(training.recipe), training.recipe)(training)
+
+
+def export(checkpoint: Path, path: Path) -> None:
+    """Write the network of a checkpoint as ONNX; raises SensorError if it is none."""
+    import pickle
+
+    import torch
+
+    if not checkpoint.is_file():
+        raise SensorError(f"{checkpoint}: there is no such checkpoint.")
+    try:
+        recipe = json.loads(torch.load(checkpoint, weights_only=True)["recipe"])
+    except (KeyError, RuntimeError, TypeError, ValueError, pickle.UnpicklingError) as error:
+        raise SensorError(
+            f"{checkpoint}: it is no checkpoint of a training ({type(error).__name__})."
+        ) from error
+    _chosen(EXPORT, recipe.get("family"), checkpoint)(checkpoint, path)
+
+
+def family_of(recipe: Path) -> object:
+    """Return the entry `family` of a recipe; raises SensorError if it is not to be read."""
+    try:
+        content = YAML(typ="safe").load(recipe)
+    except OSError as error:
+        raise SensorError(f"{recipe}: it cannot be read: {error.strerror}.") from error
+    except YAMLError as error:
+        raise SensorError(f"{recipe}: it is no valid YAML: {error}") from error
+    return content.get("family") if isinstance(content, dict) else None
+
+
+def _chosen(table: Mapping[str, _T], family: object, source: Path) -> _T:
+    """Return the entry of a family; raises SensorError with the nearest one if there is none."""
+    if isinstance(family, str) and family in table:
+        return table[family]
+    known = ", ".join(sorted(table))
+    near = get_close_matches(str(family), table, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise SensorError(f"{source}: family is {family!r}, where one of {known} belongs{hint}.")
