@@ -11,7 +11,7 @@ SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
-.PHONY: demo test check fmu cross dataset train validation evaluated paper evaluation manoeuvres roads benchmarks sanitize clean
+.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation manoeuvres roads benchmarks sanitize clean
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -58,10 +58,20 @@ dataset: $(VENV)/test.stamp ## data/paper, data/own and data/evaluation (about s
 	    $(BIN)/cosim sensor dataset scenarios/datasets/$$name.yaml --out data/$$name || exit; \
 	done
 
-train: dataset ## the published network and filter (about 25 minutes on 2 cores); resumes where it was stopped
-	$(BIN)/python -m sensor.train --data $(DATA) --recipe sensor/recipes/paper.yaml --out build/training --resume
-	cp build/training/bilstm_w19.onnx sensor/models/bilstm_w19_ideal.onnx
-	cp build/training/training.json sensor/models/bilstm_w19_ideal.json
+train: dataset ## the shipped filters and windowed networks (about an hour on one core); goes on where it was stopped
+	$(BIN)/cosim sensor train sensor/recipes/fir.yaml --data data/own --out sensor/models
+	$(BIN)/cosim sensor train sensor/recipes/paper.yaml --data data/paper --out build/training/bilstm_w19_ideal --resume
+	$(BIN)/cosim sensor train sensor/recipes/bilstm_residual_w19_ideal.yaml --data data/own --out build/training/bilstm_residual_w19_ideal --resume
+	$(BIN)/cosim sensor train sensor/recipes/bilstm_residual_w19_production.yaml --data data/own --out build/training/bilstm_residual_w19_production --resume
+	for name in bilstm_w19_ideal bilstm_residual_w19_ideal bilstm_residual_w19_production; do \
+	    $(BIN)/cosim sensor export build/training/$$name/checkpoint.pt -o sensor/models/$$name.onnx || exit; \
+	done
+
+search: dataset ## the search over the network's shape in short: build/search/search.json (about an hour on one core); resumable
+	$(BIN)/cosim sensor search sensor/recipes/search.yaml --data data/paper --out build/search
+
+search-full: dataset ## the paper's whole search (days on one core); may be started on several machines at once
+	$(BIN)/cosim sensor search sensor/recipes/search_full.yaml --data data/paper --out build/search_full --jobs 2
 
 evaluated: $(VENV)/test.stamp ## every estimator on the runs of scenarios/datasets/evaluation.yaml; what is known already is kept
 	$(BIN)/cosim sensor dataset scenarios/datasets/evaluation.yaml --out $(EVALUATION_DATA)

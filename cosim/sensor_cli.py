@@ -100,7 +100,7 @@ def _names(text: str | None) -> list[str] | None:
 @click.argument("recipe", type=click.Path(path_type=Path))
 @click.option("--data", metavar="DIR", required=True, type=_DIRECTORY, help="Runs (Parquet).")
 @click.option("--out", metavar="DIR", required=True, type=_DIRECTORY, help="Where results go.")
-@click.option("--resume", is_flag=True, help="Go on from the checkpoint in the results' directory.")
+@click.option("--resume", is_flag=True, help="Go on from the checkpoint in --out, if there is one.")
 @click.option("--seed", metavar="N", type=click.IntRange(0), help="In place of the recipe's seed.")
 def train(recipe: Path, data: Path, out: Path, resume: bool, seed: int | None) -> None:
     """Train what RECIPE, a YAML file, describes: checkpoint, training.json and network in DIR.

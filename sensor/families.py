@@ -52,14 +52,37 @@ def _carried(training: Training) -> None:
         train(recipe, training.data, training.out, training.resume, tell)
 
 
+def _fir(training: Training) -> None:
+    from sensor.baselines.fit import train
+
+    if training.resume or training.seed is not None:
+        raise SensorError("the linear filters are fitted at once: nothing to resume, no seed.")
+    data, recipe = training.data.name, training.recipe.name
+    command = f"cosim sensor train {recipe} --data {data} --out {training.out.name}"
+    train(training.data, training.recipe, training.out, command)
+
+
 def _export_bilstm(checkpoint: Path, path: Path) -> None:
     from sensor.training import export_checkpoint
 
     export_checkpoint(checkpoint, path)
 
 
-TRAIN: Final[Mapping[str, Callable[[Training], None]]] = {"bilstm": _bilstm, "carried": _carried}
-EXPORT: Final[Mapping[str, Callable[[Path, Path], None]]] = {"bilstm": _export_bilstm}
+def _export_carried(checkpoint: Path, path: Path) -> None:
+    from sensor.carried.training import export_checkpoint
+
+    export_checkpoint(checkpoint, path)
+
+
+TRAIN: Final[Mapping[str, Callable[[Training], None]]] = {
+    "bilstm": _bilstm,
+    "carried": _carried,
+    "fir": _fir,
+}
+EXPORT: Final[Mapping[str, Callable[[Path, Path], None]]] = {
+    "bilstm": _export_bilstm,
+    "carried": _export_carried,
+}
 
 
 def train(training: Training) -> None:
@@ -101,5 +124,5 @@ def _chosen(table: Mapping[str, _T], family: object, source: Path) -> _T:
         return table[family]
     known = ", ".join(sorted(table))
     near = get_close_matches(str(family), table, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise SensorError(f"{source}: family is {family!r}, where one of {known} belongs{hint}.")
+    hint = f"; did you mean {near[0]!r}?" if near else "."
+    raise SensorError(f"{source}: family is {family!r}, where one of {known} belongs{hint}")

@@ -64,10 +64,13 @@ def train(
 def fit(
     recipe: Recipe, training: Sequence[Run], validation: Sequence[Run], out: Path, *, resume: bool
 ) -> tuple[BiLstmNetwork, dict[str, Any]]:
-    """Train on runs already read; return the network of the best epoch and the training record."""
+    """Train on runs already read; return the network of the best epoch and the training record.
+
+    With `resume` the training goes on from the checkpoint in `out`, if there is one.
+    """
     trainer = Trainer.of(recipe, *window_sets(recipe, training, validation))
     network = trainer.network
-    if resume:
+    if resume and (out / "checkpoint.pt").is_file():
         trainer.load(out / "checkpoint.pt")
     description = _describe(recipe, training, validation)
     total = recipe.training.epochs
@@ -189,11 +192,7 @@ class Trainer:
         temporary.replace(path)
 
     def load(self, path: Path) -> None:
-        """Go on from a checkpoint; raises SensorError if there is none or it belongs to another
-        recipe.
-        """
-        if not path.is_file():
-            raise SensorError(f"{path}: there is no checkpoint to go on from.")
+        """Go on from a checkpoint; raises SensorError if it belongs to another recipe."""
         checkpoint = torch.load(path, weights_only=True)
         # A longer training of the same recipe may go on from here, so `epochs` may differ.
         if _without_epochs(Recipe.model_validate_json(checkpoint["recipe"])) != _without_epochs(

@@ -1,3 +1,4 @@
+import json
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -7,10 +8,13 @@ from typing import Any
 import numpy as np
 import optuna
 import pytest
+from click.testing import CliRunner
 from optuna.trial import Trial, TrialState
 from search_rig import bowl, hanging, make_recipe, measured_bowl, open_all, slow_bowl, start
 from test_sensor_training import TRAINING, VALIDATION
 
+from cosim.cli import main
+from sensor.dataset import write_run
 from sensor.errors import SensorError
 from sensor.recipe import RECIPES, EarlyStop, read_search_recipe
 from sensor.search.durations import Shape, durations
@@ -145,3 +149,32 @@ def test_the_recipes_search_what_the_paper_searched(name: str) -> None:
     for span in (recipe.units, recipe.hidden):
         assert (span.least, span.most) == (1, 512)
     assert not any("hockenheim" in pattern for pattern in recipe.runs.training)
+
+
+def test_the_command_searches_and_writes_the_table(tmp_path: Path) -> None:
+    for run in (*TRAINING, *VALIDATION):
+        write_run(tmp_path / f"{run.name}.parquet", run)
+    recipe = tmp_path / "recipe.yaml"
+    recipe.write_text(make_recipe(trials=3, startup=3).model_dump_json())
+    arguments = ["sensor", "search", str(recipe), "--data", str(tmp_path), "--out", str(tmp_path)]
+    result = CliRunner().invoke(main, [*arguments, "--summary"])
+    assert result.exit_code == 2
+    assert "there is no search" in result.output
+    result = CliRunner().invoke(main, [*arguments, "--samples", "5"])
+    assert result.exit_code == 0, result.output
+    found = json.loads((tmp_path / "search.json").read_text())
+    assert [row["window"] for row in found["windows"]] == [3, 5]
+    for row in found["windows"]:
+        assert len(row["trials"]) == 3
+        best = min(row["trials"], key=lambda trial: trial["rmse"])
+        assert (best["units"], best["hidden"], best["rmse"]) == (
+            row["units"], row["hidden"], row["rmse"],
+        )  # fmt: skip
+        shape = (len(row["surface"]["units"]), len(row["surface"]["hidden"]))
+        assert np.shape(row["surface"]["mean"]) == np.shape(row["surface"]["std"]) == shape
+    assert found["windows"][0]["relative_error_percent"] == 100.0
+    assert [row["window"] for row in found["paper_shapes"]] == [3, 7, 11, 17, 19, 21, 25, 31, 51]
+    before = (tmp_path / "studies.sqlite3").stat().st_mtime_ns
+    again = CliRunner().invoke(main, [*arguments, "--summary", "--samples", "5"])
+    assert again.exit_code == 0
+    assert (tmp_path / "studies.sqlite3").stat().st_mtime_ns == before

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 from pydantic import ValidationError
 from sensor_run import run_of
 
-from sensor import train as train_module
+from cosim.cli import main
 from sensor.dataset import Run, write_run
 from sensor.errors import SensorError
 from sensor.recipe import RECIPES, Recipe, RunSelection, TrainingRecipe, read_recipe
@@ -66,8 +66,6 @@ def test_resumed_training_ends_in_the_same_weights(tmp_path: Path) -> None:
         assert torch.equal(value, resumed.state_dict()[name]), name
     with pytest.raises(SensorError, match="another recipe"):
         fit(make_recipe(batch_size=32), TRAINING, VALIDATION, parts, resume=True)
-    with pytest.raises(SensorError, match="no checkpoint"):
-        fit(make_recipe(), TRAINING, VALIDATION, tmp_path / "none", resume=True)
 
 
 def test_every_draw_of_the_measurement_is_another_and_comes_again() -> None:
@@ -101,7 +99,7 @@ def test_train_writes_network_and_record(tmp_path: Path) -> None:
     recipe.write_text(make_recipe(epochs=1).model_dump_json())  # JSON is YAML
     out = tmp_path / "out"
     network = train(tmp_path, recipe, out)
-    onnx_sensor = OnnxSensor(out / "bilstm_w5.onnx")
+    onnx_sensor = OnnxSensor(out / "small.onnx")
     record = json.loads((out / "training.json").read_text())
     assert onnx_sensor.info.metadata["training"] == record
     assert record["samples"] == {"training": {"a": 600, "b": 600}, "validation": {"c": 600}}
@@ -112,18 +110,54 @@ def test_train_writes_network_and_record(tmp_path: Path) -> None:
     np.testing.assert_allclose(estimate[4], expected, rtol=0.0, atol=1e-5)
 
 
+def command(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["sensor", *map(str, arguments)])
+
+
 def test_command_reports_every_problem_and_exits_with_2(tmp_path: Path) -> None:
     recipe = tmp_path / "recipe.yaml"
-    recipe.write_text("name: x\nseed: -1\nruns: {training: [a], validation: [b]}\nextra: 1\n")
-    arguments = ["--data", str(tmp_path), "--recipe", str(recipe), "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(train_module.main, arguments)
+    arguments = ("train", recipe, "--data", tmp_path, "--out", tmp_path / "out")
+    for content, sentences in {
+        "family: bilstm\nname: x\nseed: -1\nruns: {training: [a], validation: [b]}\nextra: 1\n": (
+            "recipe.yaml: seed:",
+            "recipe.yaml: extra:",
+        ),
+        "family: bilstm\nname: x\nruns: {training: [a], validation: [b]}\n": (
+            "'a' matches no Parquet file",
+        ),
+        "family: bilsm\nname: x\n": ("family is 'bilsm'", "did you mean 'bilstm'?"),
+        "name: x\n": ("family is None, where one of bilstm, carried, fir belongs",),
+        "name: x\nname: y\n": ("no valid YAML",),
+    }.items():
+        recipe.write_text(content)
+        result = command(*arguments)
+        assert result.exit_code == 2
+        for sentence in sentences:
+            assert sentence in result.output
+    result = command("train", tmp_path / "none.yaml", "--data", tmp_path, "--out", tmp_path)
     assert result.exit_code == 2
-    assert "seed" in result.output
-    assert "extra" in result.output
-    recipe.write_text("name: x\nruns: {training: [a], validation: [b]}\n")
-    result = CliRunner().invoke(train_module.main, arguments)
-    assert result.exit_code == 2
-    assert "'a' matches no Parquet file" in result.output
+    assert "none.yaml: it cannot be read" in result.output
+
+
+def test_commands_train_resume_and_export(tmp_path: Path) -> None:
+    for run in (*TRAINING, *VALIDATION):
+        write_run(tmp_path / f"{run.name}.parquet", run)
+    recipe, out = tmp_path / "recipe.yaml", tmp_path / "out"
+    arguments = ("train", recipe, "--data", tmp_path, "--out", out, "--seed", "5")
+    recipe.write_text(make_recipe(epochs=1).model_dump_json())
+    assert command(*arguments).exit_code == 0
+    recipe.write_text(make_recipe(epochs=2).model_dump_json())
+    assert command(*arguments, "--resume").exit_code == 0
+    record = json.loads((out / "training.json").read_text())
+    assert record["recipe"]["seed"] == 5
+    assert [epoch["epoch"] for epoch in record["epochs"]] == [1, 2]
+    assert command("export", out / "checkpoint.pt", "-o", tmp_path / "again.onnx").exit_code == 0
+    assert (tmp_path / "again.onnx").read_bytes() == (out / "small.onnx").read_bytes()
+    for file in (recipe, tmp_path / "none.pt"):
+        result = command("export", file, "-o", tmp_path / "not.onnx")
+        assert result.exit_code == 2
+        assert "checkpoint" in result.output
+    assert not (tmp_path / "not.onnx").exists()
 
 
 def test_the_papers_recipe() -> None:
