@@ -88,6 +88,12 @@ evaluation: evaluated ## all estimators on all cases, and the goals: docs/estima
 manoeuvres: $(VENV)/test.stamp ## how the paper's manoeuvres were driven: docs/paper-scenarios.md (about a minute)
 	$(ONE_THREAD) $(BIN)/python docs/measure/manoeuvres.py
 
+kalman: $(VENV)/test.stamp ## the Kalman filters of sensor/models (about five minutes)
+	$(BIN)/cosim sensor kalman --out sensor/models
+
+bounds: $(VENV)/test.stamp ## what can be known at all, from the Riccati equation: docs/bounds.md (about three minutes)
+	$(ONE_THREAD) $(BIN)/python docs/measure/bounds.py --data $(EVALUATION_DATA)
+
 roads: $(VENV)/test.stamp ## surfaces, bumpy road and road scenarios: the tables of docs/roads.md (about four minutes)
 	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/surfaces.py
 	OMP_NUM_THREADS=1 $(BIN)/python docs/measure/bumps.py

@@ -91,6 +91,23 @@ def evaluate(
         run(data, _names(estimators), _names(conditions), out, jobs or cores())
 
 
+@sensor.command()
+@click.option(
+    "--out",
+    metavar="DIR",
+    required=True,
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Where the filters go, <name>_<condition>.npz.",
+)
+def kalman(out: Path) -> None:
+    """Design the Kalman filters on the vehicle FMU, linearised at a grid of speeds."""
+    one_thread()
+    with failures_as_exit_codes():
+        from cosim.kalman.design import write_all
+
+        write_all(out, lambda path: click.echo(path, err=True))
+
+
 def _names(text: str | None) -> list[str] | None:
     """Return the names of a list with commas; None if nothing is named."""
     return None if text is None else [name.strip() for name in text.split(",") if name.strip()]

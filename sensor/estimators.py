@@ -48,6 +48,12 @@ def _fir(path: Path) -> "Estimator":
     return FirFilter.load(path)
 
 
+def _kalman(path: Path) -> "Estimator":
+    from sensor.kalman.filter import KalmanFilter
+
+    return KalmanFilter.load(path)
+
+
 def _zero(_: Condition) -> "Estimator":
     from sensor.baselines import Zero
 
@@ -67,6 +73,10 @@ _ESTIMATORS: Final[Mapping[str, Fitted | Callable[[Condition], "Estimator"]]] = 
     "fir_w64": Fitted(".npz", _fir),
     "fir_residual_w19": Fitted(".npz", _fir),
     "fir_residual_w64": Fitted(".npz", _fir),
+    "kalman_imu": Fitted(".npz", _kalman),
+    "kalman_wheels": Fitted(".npz", _kalman),
+    "kalman_delay": Fitted(".npz", _kalman),
+    "kalman": Fitted(".npz", _kalman),
     "bilstm_w19": Fitted(".onnx", _network, ("ideal",)),
     "bilstm_residual_w19": Fitted(".onnx", _network),
     "carried": Fitted(".onnx", _carried),

@@ -1,0 +1,1 @@
+"""Kalman filters for the suspension velocities, designed on the linearised vehicle FMU."""
