@@ -25,7 +25,7 @@ from sensor.kalman.model import DAMPERS, DRIVING, PARTS, SETS, KalmanModel
 
 Array = npt.NDArray[np.float64]
 
-SPEEDS: Final = (1.0, 3.6, 4.5, 6.5, 9.5, 14.0, 20.0, 28.0, 40.0)  # m/s
+SPEEDS: Final = (1.0, 1.5, 2.2, 3.6, 4.5, 6.5, 9.5, 14.0, 20.0, 28.0, 40.0)  # m/s
 SLOWEST_DELAY: Final = 4.5  # m/s: below it the delay line would be longer than it is worth
 DAMPING_FROM: Final = 0.057  # m/s, the suspension velocity's deviation on class B at 50 km/h
 WHEELBASE: Final = Geometry().front_x - Geometry().rear_x
@@ -179,7 +179,7 @@ def _gains(d: Design, taps: int) -> dict[str, Array]:
         "K_taps": K_taps,
         "P": -f.P[rates, :n],
         "P_taps": -P_taps,
-        "information": np.linalg.inv(f.S),
+        "information": np.asarray(np.linalg.inv(f.S), np.float64),
         "deviation": d.deviation(),
     }
 

@@ -100,7 +100,7 @@ def stationary(p: Sampled) -> Stationary:
     S = p.H @ X @ p.H.T + p.R
     K = np.linalg.solve(S, p.H @ X).T
     P = X - K @ p.H @ X
-    return Stationary(K, X, 0.5 * (P + P.T), S)
+    return Stationary(np.asarray(K, np.float64), X, 0.5 * (P + P.T), S)
 
 
 def _doubled(p: Sampled) -> Array:

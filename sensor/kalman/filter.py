@@ -35,6 +35,7 @@ NEWEST: Final = 0.3  # share of a new sample in the accelerations that tell of t
 ATTACK, RELEASE = 0.5, 0.02  # and how fast they count, how slowly they are forgotten
 NEWTON: Final = 2  # steps to the dampers' velocities
 LEAST_LEVEL: Final = 1e-4
+LARGEST: Final = 8.0  # m/s: no suspension moves so fast; a filter that says so starts anew
 
 
 class TyreForces:
@@ -131,6 +132,9 @@ class KalmanFilter:
         self.correct(measured, command)
         self._started = True
         np.negative(self._x.take(self.model.rates, out=self._force, mode="clip"), out=self.estimate)
+        if not -LARGEST < self.estimate.min() <= self.estimate.max() < LARGEST:
+            self.reset()
+            return False
         self.deviation.fill(0.0)
         for gains, share in self.gains:
             np.multiply(
@@ -148,15 +152,15 @@ class KalmanFilter:
             x[before] = 0.0
         self._dampers.set(command)
         for _ in range(self.model.substeps):
-            before = self._x.take(self.model.rates, out=self._force, mode="clip").tolist()
+            early = self._x.take(self.model.rates, out=self._force, mode="clip").tolist()
             np.matmul(at.F, self._x, out=self._next)
             np.multiply(at.steer, steer, out=self._add)
             self._next += self._add
             if self.line is not None:
                 np.matmul(at.rear, self.meet(self.line), out=self._add)
                 self._next += self._add
-            after = self._next.take(self.model.rates, out=self._force, mode="clip").tolist()
-            self.add_forces([-0.5 * (a + b) for a, b in zip(before, after, strict=True)])
+            late = self._next.take(self.model.rates, out=self._force, mode="clip").tolist()
+            self.add_forces([-0.5 * (a + b) for a, b in zip(early, late, strict=True)])
             self._x, self._next = self._next, self._x
 
     def add_forces(self, extension: list[float]) -> None:

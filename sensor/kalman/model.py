@@ -105,7 +105,8 @@ class KalmanModel:
         places = {n: getattr(self, n) for n in ("rows", "rates", "offsets", "moved")}
         vectors = {n: getattr(self, n).astype(np.float32) for n in ("speeds", "first", "limits")}
         text = np.array(json.dumps(about, sort_keys=True))
-        np.savez_compressed(path, metadata=text, **numbers, **places, **vectors)
+        arrays: dict[str, Any] = {"metadata": text, **numbers, **places, **vectors}
+        np.savez_compressed(path, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> "KalmanModel":
