@@ -6,12 +6,13 @@ BIN := $(VENV)/bin
 DEMO ?= scenarios/paper/hockenheim_normal.yaml --set road.surface=A
 DATA ?= data/paper
 EVALUATION_DATA ?= data/evaluation
+HOUR_DATA ?= data/hour
 EVALUATION ?= build/evaluation.json
 SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
-.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation manoeuvres roads benchmarks sanitize clean
+.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness manoeuvres roads benchmarks sanitize clean
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -84,6 +85,12 @@ paper: evaluated ## the paper's tables and figures beside ours: docs/paper.md
 evaluation: evaluated ## all estimators on all cases, and the goals: docs/estimators-compared.md
 	$(BIN)/python -m pip install --quiet -e '.[docs]'
 	$(ONE_THREAD) $(BIN)/python docs/measure/estimators.py --evaluation $(EVALUATION) --data $(EVALUATION_DATA)
+
+robustness: $(VENV)/test.stamp ## an hour, faulty channels, spinning wheels, slow errors: docs/robustness.md
+	$(BIN)/cosim sensor dataset scenarios/datasets/evaluation.yaml --out $(EVALUATION_DATA)
+	$(BIN)/cosim sensor dataset scenarios/datasets/hour.yaml --out $(HOUR_DATA)
+	$(BIN)/python -m pip install --quiet -e '.[docs]'
+	$(ONE_THREAD) $(BIN)/python docs/measure/robustness.py --data $(EVALUATION_DATA) --hour-data $(HOUR_DATA)
 
 manoeuvres: $(VENV)/test.stamp ## how the paper's manoeuvres were driven: docs/paper-scenarios.md (about a minute)
 	$(ONE_THREAD) $(BIN)/python docs/measure/manoeuvres.py

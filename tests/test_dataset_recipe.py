@@ -250,7 +250,7 @@ def recipes() -> dict[str, tuple[Recipe, list[PlannedRun]]]:
 
 def test_no_seed_is_in_two_recipes_or_in_a_scenario(recipes: Recipes) -> None:
     """Surfaces, roads, mixes and dampers of the evaluation were never trained on."""
-    assert set(recipes) == {"paper", "own", "evaluation"}
+    assert set(recipes) == {"paper", "own", "evaluation", "hour"}
     seeds = [run.seed for _, runs in recipes.values() for run in runs]
     assert len(set(seeds)) == len(seeds)
     assert len({recipe.seed for recipe, _ in recipes.values()}) == len(recipes)

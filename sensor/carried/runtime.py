@@ -14,6 +14,12 @@ from sensor.errors import SensorError
 from sensor.runtime import open_session, read_info
 from sensor.window import check_sample
 
+# What sensors may say, far beyond what a car ever does: a garbled sample must not be squared into
+# infinity, or the state would never come back from it
+LARGEST = np.array(
+    [*3 * (80.0,), *3 * (10.0,), 120.0, *2 * (1.2,), *4 * (120.0,), 20.0]
+)  # m/s2, rad/s, m/s, rad, m/s, rad
+LEAST = -LARGEST
 STATES = ("samples", "energy", "means", "integrals", "line", "hidden", "cell")
 WARM_UP = 50  # samples until the carried state has settled and an estimate counts
 
@@ -45,6 +51,7 @@ class CarriedSensor:
         ]
         self._bindings = [self._bind(0), self._bind(1)]
         self._magnitude = np.zeros(len(CHANNEL_NAMES))
+        self._within = np.zeros(len(CHANNEL_NAMES))
         self._fits = np.zeros(len(CHANNEL_NAMES), dtype=np.bool_)
         self._count = 0
         self.estimate = np.full(len(OUTPUTS), np.nan)
@@ -63,11 +70,12 @@ class CarriedSensor:
         """Take one sample (14,) and the damper command (4,) held until it; return whether the
         estimate counts.
 
-        Raises SensorError naming the channel if the sample holds a NaN or infinity; such a sample
-        is not taken.
+        Finite values beyond `LARGEST` are cut off there. Raises SensorError naming the channel if
+        the sample holds a NaN or infinity; such a sample is not taken.
         """
         check_sample(measured, self._magnitude, self._fits)
-        self._measured[0] = measured
+        np.clip(measured, LEAST, LARGEST, out=self._within)
+        self._measured[0] = self._within
         self._command[0] = command
         self._session.run_with_iobinding(self._bindings[self._count % 2])
         self._count += 1
