@@ -136,6 +136,7 @@ def verify(path: Path, network: CarriedNetwork, samples: int = 400) -> None:
     channels[:, CHANNEL_NAMES.index("Car.vx")] = speed
     channels[:, WHEEL_SPEEDS] = speed[:, np.newaxis] + random.normal(scale=0.02, size=(samples, 4))
     channels[:, [5, *STEER]] *= 0.1
+    channels = channels.astype(np.float32).astype(np.float64)  # what the graph is given
     commands = random.uniform(size=(samples, 4))
     sensor = CarriedSensor(path)
     got, deviation = sensor.apply_with_deviation(channels, commands)
@@ -154,25 +155,39 @@ def _node(kind: str, inputs: str, output: str, **attributes: Any) -> NodeProto:
 
 
 def _residual() -> list[NodeProto]:
-    """Wheel-speed residuals: `sensor.features`."""
+    """Wheel-speed residuals: `sensor.features`, in double precision, as they are small differences
+    of large speeds; cos x = 1 - 2 sin(x/2)^2 keeps its digits with a sine in single precision.
+    """
+    double = TensorProto.DOUBLE
     return [
         _node("Gather", "measured i_ax", "ax", axis=1),
         _node("Gather", "measured i_ay", "ay", axis=1),
         _node("Gather", "measured i_yaw", "yaw", axis=1),
         _node("Gather", "measured i_vx", "vx", axis=1),
         _node("Gather", "measured i_road_wheels", "road_wheels", axis=1),
-        _node("Gather", "measured i_wheel_speeds", "wheel_speeds", axis=1),
-        _node("Mul", "yaw wheel_y", "turning"),
-        _node("Sub", "vx turning", "forward"),
-        _node("Cos", "road_wheels", "cosines"),
-        _node("Concat", "cosines ones", "headings", axis=1),
+        _node("Mul", "road_wheels half", "half_angles"),
+        _node("Sin", "half_angles", "half_sines"),
+        _node("Cast", "half_sines", "half_sines_64", to=double),
+        _node("Mul", "half_sines_64 half_sines_64", "half_squares"),
+        _node("Mul", "half_squares two_64", "versines"),
+        _node("Sub", "one_64 versines", "cosines"),
+        _node("Concat", "cosines ones_64", "headings", axis=1),
+        _node("Cast", "measured", "measured_64", to=double),
+        _node("Gather", "measured_64 i_ax", "ax_64", axis=1),
+        _node("Gather", "measured_64 i_ay", "ay_64", axis=1),
+        _node("Gather", "measured_64 i_yaw", "yaw_64", axis=1),
+        _node("Gather", "measured_64 i_vx", "vx_64", axis=1),
+        _node("Gather", "measured_64 i_wheel_speeds", "wheel_speeds", axis=1),
+        _node("Mul", "yaw_64 wheel_y", "turning"),
+        _node("Sub", "vx_64 turning", "forward"),
         _node("Div", "forward headings", "rolling"),
-        _node("Mul", "ax per_ax", "slip_x"),
-        _node("Mul", "ay per_ay", "slip_y"),
+        _node("Mul", "ax_64 per_ax", "slip_x"),
+        _node("Mul", "ay_64 per_ay", "slip_y"),
         _node("Add", "slip_x slip_y", "slip_xy"),
         _node("Add", "slip_xy axle", "slip"),
         _node("Mul", "rolling slip", "driving"),
-        _node("Sub", "wheel_speeds driving", "left_over"),
+        _node("Sub", "wheel_speeds driving", "left_over_64"),
+        _node("Cast", "left_over_64", "left_over", to=TensorProto.FLOAT),
         _node("Clip", "left_over residual_least residual_most", "residual"),
     ]
 
@@ -331,9 +346,7 @@ def _feature_constants(c: FeatureConfig) -> Arrays:
     slow = [c.slip_time] * 4 + [c.bias_time] * 3 + [c.level_time]
     settling = [c.settling[0]] * 4 + [c.settling[1]] * 3 + [0.25 * c.level_time]
     reals = {
-        "wheel_y": y, "ones": [[1.0, 1.0]], "one": [[1.0]], "per_ax": s.per_ax,
-        "per_ay": -s.per_ay * np.sign(y),
-        "axle": 1.0 + np.array([s.front, s.front, s.rear, s.rear]),
+        "one": [[1.0]], "half": 0.5,
         "residual_least": -s.limit, "residual_most": s.limit,
         "slip_least": -c.slip_limit, "slip_most": c.slip_limit, "least_speed": c.least_speed,
         "slowest_rates": [[h / time for time in slow]],
@@ -346,6 +359,11 @@ def _feature_constants(c: FeatureConfig) -> Arrays:
         "two": 2.0, "minus_six": -6.0,
         "speed_unit": 30.0, "slowness_unit": 10.0,
     }  # fmt: skip
+    doubles = {
+        "wheel_y": y, "ones_64": [[1.0, 1.0]], "one_64": 1.0, "two_64": 2.0,
+        "per_ax": s.per_ax, "per_ay": -s.per_ay * np.sign(y),
+        "axle": 1.0 + np.array([s.front, s.front, s.rear, s.rear]),
+    }  # fmt: skip
     wholes = {
         "i_ax": [0], "i_ay": [1], "i_free": [2, 3, 4], "i_yaw": [5], "i_vx": [6],
         "i_road_wheels": [7, 8], "i_wheel_speeds": WHEEL_SPEEDS, "i_steer": STEER,
@@ -356,6 +374,7 @@ def _feature_constants(c: FeatureConfig) -> Arrays:
     }  # fmt: skip
     return {
         **{name: np.asarray(value, dtype=np.float32) for name, value in reals.items()},
+        **{name: np.asarray(value, dtype=np.float64) for name, value in doubles.items()},
         **{name: np.asarray(value, dtype=np.int64) for name, value in wholes.items()},
     }
 
