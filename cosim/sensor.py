@@ -10,7 +10,7 @@ from cosim.wiring import Wiring
 from sensor import SensorError
 from sensor.channels import STAGE
 from sensor.conditions import Measurement
-from sensor.estimators import make, model_file
+from sensor.estimators import make, model_file, open_network
 
 if TYPE_CHECKING:
     from cosim.scenario.schema import Scenario
@@ -36,9 +36,7 @@ def estimator_of(scenario: Scenario) -> Estimator:
     try:
         if settings.network is None:
             return make(str(settings.estimator), settings.condition)
-        from sensor import OnnxSensor
-
-        return OnnxSensor(scenario.resolve(settings.network))
+        return open_network(scenario.resolve(settings.network))
     except SensorError as error:
         raise NetworkError(str(error)) from None
 

@@ -15,7 +15,7 @@ from sensor.errors import SensorError
 if TYPE_CHECKING:
     from sensor.estimator import Estimator
 
-DEFAULT: Final = "bilstm_w19"
+DEFAULT: Final = "carried"
 MODELS: Final = Path(__file__).parent / "models"
 
 
@@ -30,16 +30,16 @@ class Fitted:
     conditions: tuple[Condition, ...] = CONDITIONS
 
 
-def _network(path: Path) -> "Estimator":
-    from sensor.runtime import OnnxSensor
+def open_network(path: Path) -> "Estimator":
+    """Open a network file, windowed or with carried state, as its metadata say.
 
-    return OnnxSensor(path)
-
-
-def _carried(path: Path) -> "Estimator":
+    Raises SensorError if it is none or its channels, units or rate are not this sensor's.
+    """
     from sensor.carried.runtime import CarriedSensor
+    from sensor.runtime import OnnxSensor, open_session, read_info
 
-    return CarriedSensor(path)
+    carried = read_info(open_session(path), str(path)).kind == "carried"
+    return CarriedSensor(path) if carried else OnnxSensor(path)
 
 
 def _fir(path: Path) -> "Estimator":
@@ -77,9 +77,9 @@ _ESTIMATORS: Final[Mapping[str, Fitted | Callable[[Condition], "Estimator"]]] = 
     "kalman_wheels": Fitted(".npz", _kalman),
     "kalman_delay": Fitted(".npz", _kalman),
     "kalman": Fitted(".npz", _kalman),
-    "bilstm_w19": Fitted(".onnx", _network, ("ideal",)),
-    "bilstm_residual_w19": Fitted(".onnx", _network),
-    "carried": Fitted(".onnx", _carried),
+    "bilstm_w19": Fitted(".onnx", open_network, ("ideal",)),
+    "bilstm_residual_w19": Fitted(".onnx", open_network),
+    "carried": Fitted(".onnx", open_network),
 }
 
 

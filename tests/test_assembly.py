@@ -295,7 +295,7 @@ def test_a_network_that_is_none(tmp_path: Path) -> None:
 def test_an_installation_without_a_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sensor.estimators.MODELS", tmp_path)
     scenario = load(write_scenario(tmp_path))
-    with pytest.raises(NetworkError, match="'bilstm_w19' is not shipped for condition ideal"):
+    with pytest.raises(NetworkError, match="'carried' is not shipped for condition ideal"):
         assemble(scenario, scenario.controllers[0])
 
 

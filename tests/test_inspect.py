@@ -277,7 +277,7 @@ def test_a_scenario(tmp_path: Path) -> None:
         "path": "driver.speed_kmh", "value": 90.0, "unit": "km/h", "origin": "given",
     }  # fmt: skip
     assert values["driver.style"]["origin"] == "default"
-    assert values["sensor.estimator"]["value"] == "bilstm_w19"
+    assert values["sensor.estimator"]["value"] == "carried"
     assert values["sensor.condition"]["origin"] == "default"
     mass = values["vehicle.parameters.Body.Mass"]
     assert (mass["value"], mass["unit"], mass["origin"]) == (2600, "kg", "given")

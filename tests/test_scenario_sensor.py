@@ -36,11 +36,11 @@ def run(folder: Path, sensor: str, *overrides: str, **sections: str) -> Any:
     return execute(load(path, overrides), folder / "out")
 
 
-def test_the_default_is_the_paper_s() -> None:
+def test_the_default_is_the_project_s_best() -> None:
     scenario = load(Path(__file__).parents[1] / "scenarios" / "road" / "class_b_50.yaml")
     settings = scenario.sensor
     assert (settings.estimator, settings.network, settings.condition) == (
-        "bilstm_w19", None, "ideal",
+        "carried", None, "ideal",
     )  # fmt: skip
 
 

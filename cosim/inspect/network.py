@@ -88,11 +88,24 @@ def _fits(metadata: Mapping[str, Any]) -> str:
 
 
 def _shape(metadata: Mapping[str, Any], model: Model) -> str:
+    if metadata.get("kind") == "carried":
+        return _carried_state(model)
     wanted = [metadata.get("window"), len(CHANNELS)]
     shapes = [list(port.shape[1:]) for port in model.inputs]
     if shapes == [wanted]:
         return ""
     return f"its inputs are {shapes}, where one of {wanted} belongs behind the batch"
+
+
+def _carried_state(model: Model) -> str:
+    """Return what a network with carried state lacks: each state comes out as `next_...`."""
+    inputs = {port.name: list(port.shape) for port in model.inputs}
+    outputs = {port.name: list(port.shape) for port in model.outputs}
+    if inputs.pop("measured", None) != [1, len(CHANNELS)] or "command" not in inputs:
+        return f"it does not take one sample, measured 1 x {len(CHANNELS)}, and the damper command"
+    del inputs["command"]
+    lost = [name for name, shape in inputs.items() if outputs.get(f"next_{name}") != shape]
+    return f"it does not return its state {', '.join(lost)}" if lost else ""
 
 
 def _tables(facts: Facts, model: Model, metadata: Mapping[str, Any]) -> None:
