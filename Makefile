@@ -12,7 +12,7 @@ SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
 
-.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness manoeuvres roads benchmarks sanitize clean
+.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness manoeuvres roads benchmarks sanitize clean study retrain-check
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -59,14 +59,23 @@ dataset: $(VENV)/test.stamp ## data/paper, data/own and data/evaluation (about s
 	    $(BIN)/cosim sensor dataset scenarios/datasets/$$name.yaml --out data/$$name || exit; \
 	done
 
-train: dataset ## the shipped filters and windowed networks (about an hour on one core); goes on where it was stopped
+train: dataset ## the shipped filters and networks (about two hours on one core); goes on where it was stopped
 	$(BIN)/cosim sensor train sensor/recipes/fir.yaml --data data/own --out sensor/models
 	$(BIN)/cosim sensor train sensor/recipes/paper.yaml --data data/paper --out build/training/bilstm_w19_ideal --resume
 	$(BIN)/cosim sensor train sensor/recipes/bilstm_residual_w19_ideal.yaml --data data/own --out build/training/bilstm_residual_w19_ideal --resume
 	$(BIN)/cosim sensor train sensor/recipes/bilstm_residual_w19_production.yaml --data data/own --out build/training/bilstm_residual_w19_production --resume
-	for name in bilstm_w19_ideal bilstm_residual_w19_ideal bilstm_residual_w19_production; do \
+	for name in carried_ideal carried_production; do \
+	    $(BIN)/cosim sensor train sensor/recipes/$$name.yaml --data data/own --out build/training/$$name --resume || exit; \
+	done
+	for name in bilstm_w19_ideal bilstm_residual_w19_ideal bilstm_residual_w19_production carried_ideal carried_production; do \
 	    $(BIN)/cosim sensor export build/training/$$name/checkpoint.pt -o sensor/models/$$name.onnx || exit; \
 	done
+
+retrain-check: dataset ## every shipped network trained again with another seed: the same error within the seeds' spread?
+	$(BIN)/python docs/measure/retrain_check.py --data data
+
+study: dataset ## what makes the network with carried state good, three seeds: docs/carried-study.md (about half an hour on one core)
+	$(ONE_THREAD) $(BIN)/python docs/measure/carried_study.py --data data/own --evaluation $(EVALUATION_DATA)
 
 search: dataset ## the search over the network's shape in short: build/search/search.json (about an hour on one core); resumable
 	$(BIN)/cosim sensor search sensor/recipes/search.yaml --data data/paper --out build/search
