@@ -1,5 +1,5 @@
-"""Does retraining give the same network? `make retrain-check` trains every shipped network again with
-another seed and compares the errors on the runs held out.
+"""Does retraining give the same network? `make retrain-check` trains every shipped network again
+with another seed and compares the errors on the runs held out.
 
     python docs/measure/retrain_check.py --data data/own [--only carried_ideal] [--seed 2]
 
