@@ -18,6 +18,8 @@ COLOURS = {
     "reference": "black",
     "paper": "tab:gray",
     "bilstm_w19": "tab:blue",
+    "bilstm_residual_w19": "tab:cyan",
+    "smoother": "tab:olive",
     "carried": "tab:red",
     "fir_w19": "tab:orange",
     "kalman": "tab:green",
