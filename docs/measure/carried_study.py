@@ -252,7 +252,7 @@ def judged(network: Any, prepare: Prepare, cases: Sequence[Run], absolute: bool)
 
 def page(results: dict[str, Any]) -> str:
     """Return docs/carried-study.md."""
-    samples = "small networks (64 units), short trainings, a third of the training data"
+    samples = "small networks (64 units), short trainings, a fifth of the training data"
     text = (
         "# What makes the network with carried state good\n\n"
         f"Written by `make study`: {samples}, condition ideal. Accuracy in % (flat turns: RMSE in "
