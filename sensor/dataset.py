@@ -132,6 +132,16 @@ def read_runs(directory: str | Path, patterns: Sequence[str]) -> list[Run]:
     return [read_run(path) for path in select_files(directory, patterns)]
 
 
+def split(runs: Sequence[Run], hold_out: int) -> tuple[list[Run], list[Run]]:
+    """Return training and validation runs: every `hold_out`-th is for validation. Raises
+    SensorError if there are too few.
+    """
+    validation = list(runs[hold_out - 1 :: hold_out])
+    if not validation:
+        raise SensorError(f"of {hold_out} runs one is for validation, but there are {len(runs)}.")
+    return [run for i, run in enumerate(runs, 1) if i % hold_out], validation
+
+
 @dataclass(frozen=True)
 class Normalisation:
     """Mean and standard deviation of the channels (14,) and of the truth (4,), in their units;

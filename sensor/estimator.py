@@ -2,10 +2,13 @@
 it.
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
+import numpy as np
 import numpy.typing as npt
 from numpy import float64
+
+from sensor.channels import OUTPUTS
 
 
 class Estimator(Protocol):
@@ -34,3 +37,21 @@ class Estimator(Protocol):
         """Estimate a whole run from a fresh start, untouched by `step`: channels (samples, 14) and
         commands (samples, 4), each held until its sample -> (samples, 4) [m/s], NaN until valid.
         """
+
+
+def sample_by_sample(
+    estimator: Estimator,
+    channels: npt.NDArray[np.floating[Any]],
+    commands: npt.NDArray[np.floating[Any]],
+) -> tuple[npt.NDArray[float64], npt.NDArray[float64]]:
+    """Return estimates and deviations (samples, 4) [m/s] of a whole run, NaN where they do not
+    count; the estimator is fresh before and after.
+    """
+    result = np.full((2, len(channels), len(OUTPUTS)), np.nan)
+    samples, held = (np.asarray(part, dtype=np.float64) for part in (channels, commands))
+    estimator.reset()
+    for k in range(len(samples)):
+        if estimator.step(samples[k], held[k]):
+            result[0, k], result[1, k] = estimator.estimate, estimator.deviation
+    estimator.reset()
+    return result[0], result[1]

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sensor.channels import CHANNELS, OUTPUTS, SAMPLE_RATE_HZ
-from sensor.estimator import Estimator
+from sensor.estimator import Estimator, sample_by_sample
 
 Array = npt.NDArray[np.float64]
 
@@ -85,13 +85,7 @@ class HeldSamples:
 
     def apply_with_deviation(self, channels: Array, commands: Array) -> tuple[Array, Array]:
         """Return estimates and deviations (samples, 4) [m/s] of a whole run, as `apply` does."""
-        result = np.full((2, len(channels), len(OUTPUTS)), np.nan)
-        self.reset()
-        for k in range(len(channels)):
-            if self.step(np.asarray(channels[k], dtype=np.float64), commands[k]):
-                result[0, k], result[1, k] = self.estimate, self.deviation
-        self.reset()
-        return result[0], result[1]
+        return sample_by_sample(self, channels, commands)
 
     def _invalid(self) -> None:
         self.estimate.fill(np.nan)

@@ -19,7 +19,7 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-_P = TypeVar("_P", bound=_Part)
+_P = TypeVar("_P", bound=BaseModel)
 
 
 class NetworkRecipe(_Part):
@@ -161,15 +161,18 @@ def read_recipe(path: str | Path) -> Recipe:
     """Read a training's recipe; raises SensorError with one sentence for each entry that does not
     fit.
     """
-    return _read(path, Recipe)
+    return read_strictly(path, Recipe)
 
 
 def read_search_recipe(path: str | Path) -> SearchRecipe:
     """Read a search's recipe; raises as `read_recipe` does."""
-    return _read(path, SearchRecipe)
+    return read_strictly(path, SearchRecipe)
 
 
-def _read(path: str | Path, kind: type[_P]) -> _P:
+def read_strictly(path: str | Path, kind: type[_P]) -> _P:
+    """Read a recipe of any kind; raises SensorError with one sentence for each entry that does not
+    fit.
+    """
     try:
         content = YAML(typ="safe").load(Path(path))
         return kind.model_validate(content)

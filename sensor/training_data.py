@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sensor.conditions import Measurement
-from sensor.dataset import Normalisation, Run, WindowSet, read_runs
+from sensor.dataset import Normalisation, Run, WindowSet, read_runs, split
 from sensor.errors import SensorError
 from sensor.features import with_residuals
 from sensor.recipe import Recipe, RunSelection
@@ -23,7 +23,7 @@ def read_parts(data: Path, selection: RunSelection) -> tuple[list[Run], list[Run
         raise SensorError(
             f"{data}: of {step} runs one is held out for validation, but there are {len(training)}."
         )
-    return [run for i, run in enumerate(training, 1) if i % step], training[step - 1 :: step]
+    return split(training, step)
 
 
 def window_sets(

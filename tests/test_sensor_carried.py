@@ -14,9 +14,9 @@ from sensor.carried.network import CarriedConfig, CarriedNetwork
 from sensor.carried.recipe import CarriedRecipe, Schedule, Shape
 from sensor.carried.runtime import CarriedSensor
 from sensor.carried.streams import Sequence4, Streams
-from sensor.carried.training import Trainer, export_checkpoint, split
+from sensor.carried.training import Trainer, export_checkpoint
 from sensor.channels import CHANNEL_NAMES
-from sensor.dataset import Run
+from sensor.dataset import Run, split
 from sensor.errors import SensorError
 from sensor.features import WHEEL_SPEEDS
 

@@ -25,7 +25,7 @@ import numpy.typing as npt
 from sensor.carried.features import FeatureConfig, features, taken
 from sensor.carried.recipe import CarriedRecipe, Schedule, Shape
 from sensor.channels import CHANNEL_NAMES
-from sensor.dataset import Run, read_runs
+from sensor.dataset import Run, read_runs, split
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "carried-study.md"
@@ -143,7 +143,7 @@ def trained_and_judged(
 def fit(variant: Variant, seed: int, training: Sequence[Run], prepare: Prepare, extra: int) -> Any:
     """Train a small network on features made by `prepare`."""
     from sensor.carried.network import CarriedConfig, CarriedNetwork
-    from sensor.carried.training import Trainer, split
+    from sensor.carried.training import Trainer
 
     schedule = Schedule(epochs=variant.epochs, learning_rate=6e-3, weight_floor=variant.floor)
     recipe = CarriedRecipe(

@@ -25,7 +25,7 @@ from sensor.baselines.normal_equations import (
 from sensor.baselines.recipe import RIDGES, read_fir
 from sensor.channels import CHANNELS, OUTPUTS
 from sensor.conditions import CONDITIONS, Condition
-from sensor.dataset import Run, read_runs
+from sensor.dataset import Run, read_runs, split
 from sensor.errors import SensorError
 from sensor.provenance import versions
 
@@ -79,16 +79,6 @@ def train(
             tell(f"{path}: ridge {fir.training['ridge']:g}, validation {error:.2f} mm/s")
             files.append(path)
     return files
-
-
-def split(runs: Sequence[Run], hold_out: int) -> tuple[list[Run], list[Run]]:
-    """Return training and validation runs: every `hold_out`-th is for validation. Raises
-    SensorError if there are too few.
-    """
-    validation = list(runs[hold_out - 1 :: hold_out])
-    if not validation:
-        raise SensorError(f"of {hold_out} runs one is for validation, but there are {len(runs)}.")
-    return [run for i, run in enumerate(runs, 1) if i % hold_out], validation
 
 
 def fit_best(

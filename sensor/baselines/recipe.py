@@ -3,11 +3,9 @@
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from pydantic import BaseModel, ConfigDict, Field
 
-from sensor.errors import SensorError
+from sensor.recipe import read_strictly
 
 RIDGES = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 
@@ -29,16 +27,4 @@ class FirRecipe(BaseModel):
 
 def read_fir(path: str | Path) -> FirRecipe:
     """Read a recipe; raises SensorError with one sentence for each entry that does not fit."""
-    try:
-        return FirRecipe.model_validate(YAML(typ="safe").load(Path(path)))
-    except OSError as error:
-        raise SensorError(f"{path}: it cannot be read: {error.strerror}.") from error
-    except YAMLError as error:
-        raise SensorError(f"{path}: it is no valid YAML: {error}") from error
-    except ValidationError as error:
-        lines = [
-            f"{path}: {'.'.join(map(str, problem['loc'])) or 'the file'}: {problem['msg']}"
-            f" (got {problem['input']!r})."
-            for problem in error.errors()
-        ]
-        raise SensorError("\n".join(lines)) from error
+    return read_strictly(path, FirRecipe)

@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from pydantic import BaseModel, ConfigDict, Field
 
 from sensor.conditions import Condition
-from sensor.errors import SensorError
+from sensor.recipe import read_strictly
 
 
 class _Part(BaseModel):
@@ -59,16 +57,4 @@ class CarriedRecipe(_Part):
 
 def read_carried(path: str | Path) -> CarriedRecipe:
     """Read a recipe; raises SensorError with one sentence for each entry that does not fit."""
-    try:
-        return CarriedRecipe.model_validate(YAML(typ="safe").load(Path(path)))
-    except OSError as error:
-        raise SensorError(f"{path}: it cannot be read: {error.strerror}.") from error
-    except YAMLError as error:
-        raise SensorError(f"{path}: it is no valid YAML: {error}") from error
-    except ValidationError as error:
-        lines = [
-            f"{path}: {'.'.join(map(str, problem['loc'])) or 'the file'}: {problem['msg']}"
-            f" (got {problem['input']!r})."
-            for problem in error.errors()
-        ]
-        raise SensorError("\n".join(lines)) from error
+    return read_strictly(path, CarriedRecipe)

@@ -11,6 +11,7 @@ import onnxruntime as ort
 
 from sensor.channels import CHANNEL_NAMES, COMMANDS, OUTPUTS
 from sensor.errors import SensorError
+from sensor.estimator import sample_by_sample
 from sensor.runtime import open_session, read_info
 from sensor.window import check_sample
 
@@ -97,13 +98,7 @@ class CarriedSensor:
         """Estimates and deviations (samples, 4) [m/s] of a whole run, NaN for the first half
         second; `step`'s state is lost.
         """
-        result = np.full((2, len(channels), len(OUTPUTS)), np.nan)
-        self.reset()
-        for k in range(len(channels)):
-            if self.step(np.asarray(channels[k], dtype=np.float64), commands[k]):
-                result[0, k], result[1, k] = self.estimate, self.deviation
-        self.reset()
-        return result[0], result[1]
+        return sample_by_sample(self, channels, commands)
 
     def _bind(self, turn: int) -> ort.IOBinding:
         """Tie inputs and outputs to our arrays, whose memory never moves."""

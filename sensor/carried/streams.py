@@ -4,7 +4,6 @@ starts anew where a run does.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -92,8 +91,3 @@ def _shuffle_runs(row: list[tuple[Sequence4, int]], random: np.random.Generator)
     begins = [i for i, (_, first) in enumerate(row) if first == 0]
     parts = [row[a:b] for a, b in zip(begins, [*begins[1:], len(row)], strict=True)]
     row[:] = [item for i in random.permutation(len(parts)) for item in parts[i]]
-
-
-def total_samples(runs: Sequence[Any]) -> int:
-    """Return the number of samples of all runs."""
-    return sum(len(run.truth) for run in runs)

@@ -20,7 +20,7 @@ from sensor.carried.features import features
 from sensor.carried.network import SCALE, CarriedConfig, CarriedNetwork, State
 from sensor.carried.recipe import CarriedRecipe
 from sensor.carried.streams import Chunk, Sequence4, Streams
-from sensor.dataset import Run, read_runs
+from sensor.dataset import Run, read_runs, split
 from sensor.errors import SensorError
 from sensor.provenance import versions
 
@@ -40,15 +40,6 @@ class Progression:
     best: float = math.inf
     best_epoch: int = 0
     best_weights: dict[str, torch.Tensor] = field(default_factory=dict)
-
-
-def split(runs: Sequence[Run], hold_out: int) -> tuple[list[Run], list[Run]]:
-    """Return training and validation runs: of those sorted by name every `hold_out`-th is held
-    out.
-    """
-    ordered = sorted(runs, key=lambda run: run.name)
-    held = ordered[hold_out - 1 :: hold_out]
-    return [run for run in ordered if run not in held], held
 
 
 def train(
@@ -160,14 +151,14 @@ class Trainer:
         random = np.random.default_rng([self.recipe.seed, epoch])
         streams = Streams(settings.streams, settings.chunk, settings.warm_up)
         chunks = list(streams.chunks(self._sequences, random))
-        squares, samples = 0.0, 0.0
+        squares = 0.0
         state: State | None = None
         self.network.train()
         for number, chunk in enumerate(chunks):
             self._set_rate((epoch + number / len(chunks)) / settings.epochs)
             error, state = self._step(chunk, state)
-            squares, samples = squares + error, samples + 1
-        self._judge(epoch, math.sqrt(squares / samples), time.perf_counter() - begin)
+            squares += error
+        self._judge(epoch, math.sqrt(squares / len(chunks)), time.perf_counter() - begin)
 
     def _step(self, chunk: Chunk, state: State | None) -> tuple[float, State]:
         """One step of the optimiser; return the mean weighted square error and the next state."""

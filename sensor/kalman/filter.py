@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sensor.channels import CHANNEL_NAMES, CHANNELS, OUTPUTS, SAMPLE_RATE_HZ
+from sensor.estimator import sample_by_sample
 from sensor.kalman.damper import Dampers
 from sensor.kalman.delay import DelayLine
 from sensor.kalman.model import SETS, AtSpeed, Gains, KalmanModel
@@ -252,10 +253,4 @@ class KalmanFilter:
         self, channels: npt.NDArray[np.floating[Any]], commands: npt.NDArray[np.floating[Any]]
     ) -> tuple[Array, Array]:
         """Return estimates and predicted deviations of a whole run, (samples, 4) [m/s] each."""
-        fresh = KalmanFilter(self.model)
-        result = np.empty((2, len(channels), len(OUTPUTS)))
-        held = np.asarray(commands, dtype=np.float64)
-        for k, sample in enumerate(np.asarray(channels, dtype=np.float64)):
-            fresh.step(sample, held[k])
-            result[0, k], result[1, k] = fresh.estimate, fresh.deviation
-        return result[0], result[1]
+        return sample_by_sample(KalmanFilter(self.model), channels, commands)
