@@ -115,11 +115,18 @@ def _names(text: str | None) -> list[str] | None:
 
 @sensor.command()
 @click.argument("recipe", type=click.Path(path_type=Path))
-@click.option("--data", metavar="DIR", required=True, type=_DIRECTORY, help="Runs (Parquet).")
+@click.option(
+    "--data",
+    metavar="DIR",
+    required=True,
+    multiple=True,
+    type=_DIRECTORY,
+    help="Runs (Parquet); may be given several times.",
+)
 @click.option("--out", metavar="DIR", required=True, type=_DIRECTORY, help="Where results go.")
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint in --out, if there is one.")
 @click.option("--seed", metavar="N", type=click.IntRange(0), help="In place of the recipe's seed.")
-def train(recipe: Path, data: Path, out: Path, resume: bool, seed: int | None) -> None:
+def train(recipe: Path, data: tuple[Path, ...], out: Path, resume: bool, seed: int | None) -> None:
     """Train what RECIPE, a YAML file, describes: checkpoint, training.json and network in DIR.
 
     A training that was stopped goes on with --resume and ends in the same weights.

@@ -17,12 +17,12 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class Training:
-    """What a training is told: recipe file, directory of the runs, directory of the results,
+    """What a training is told: recipe file, directories of the runs, directory of the results,
     whether to go on from the checkpoint there, and a seed in place of the recipe's.
     """
 
     recipe: Path
-    data: Path
+    data: tuple[Path, ...]
     out: Path
     resume: bool = False
     seed: int | None = None
@@ -32,12 +32,18 @@ def _bilstm(training: Training) -> None:
     from sensor.training import train
 
     train(
-        training.data,
+        _single(training),
         training.recipe,
         training.out,
         resume=training.resume,
         seed=training.seed,
     )
+
+
+def _single(training: Training) -> Path:
+    if len(training.data) != 1:
+        raise SensorError(f"{training.recipe}: this family trains on one --data, not several.")
+    return training.data[0]
 
 
 def _carried(training: Training) -> None:
@@ -57,9 +63,9 @@ def _fir(training: Training) -> None:
 
     if training.resume or training.seed is not None:
         raise SensorError("the linear filters are fitted at once: nothing to resume, no seed.")
-    data, recipe = training.data.name, training.recipe.name
-    command = f"cosim sensor train {recipe} --data {data} --out {training.out.name}"
-    train(training.data, training.recipe, training.out, command)
+    data, recipe = _single(training), training.recipe.name
+    command = f"cosim sensor train {recipe} --data {data.name} --out {training.out.name}"
+    train(data, training.recipe, training.out, command)
 
 
 def _export_bilstm(checkpoint: Path, path: Path) -> None:

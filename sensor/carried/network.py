@@ -39,7 +39,7 @@ class CarriedNetwork(nn.Module):
     [m/s].
 
     The buffers `mean`, `std` (count,) hold the normalisation, `calibration` (4,) the factors of the
-    deviation found on validation runs.
+    deviation found on validation runs. While `coarse`, the LSTM multiplies in bfloat16.
     """
 
     mean: Tensor
@@ -49,6 +49,7 @@ class CarriedNetwork(nn.Module):
     def __init__(self, config: CarriedConfig | None = None) -> None:
         super().__init__()
         self.config = config = config or CarriedConfig()
+        self.coarse = False
         count = config.features.count
         self.front = nn.Linear(count, config.front)
         self.lstm = nn.LSTM(config.front, config.units)
@@ -64,7 +65,9 @@ class CarriedNetwork(nn.Module):
         """Return velocities, deviations (time, batch, 4) [m/s] and the next state."""
         level = SCALE * features[..., -1:]
         x = (features[..., :-1] - self.mean) / self.std
-        ahead, state = self.lstm(torch.tanh(self.front(x)), state)
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.coarse):
+            ahead, state = self.lstm(torch.tanh(self.front(x)), state)
+        ahead, state = ahead.float(), (state[0].float(), state[1].float())
         hidden = torch.relu(self.hidden(ahead))
         velocity = level * (self.output(hidden) + self.straight(x))
         log_deviation = self.log_deviation(hidden.detach()).clamp(-6.0, 3.0)

@@ -27,6 +27,9 @@ class Schedule(_Part):
 
     `weight_floor` [m/s]: each run's squared error counts by 1 / (rms(truth)^2 + weight_floor^2), so
     that quiet runs count too; None weights all samples alike.
+    `mirror`: in every epoch each run is played as it was or, as likely, as its mirror image.
+    `coarse_epochs`: in as many epochs, the first ones, the LSTM multiplies in bfloat16: half the
+    time where the processor has units for it (AMX). The last epochs belong to float32.
     """
 
     epochs: int = Field(default=40, ge=1)
@@ -35,6 +38,8 @@ class Schedule(_Part):
     chunk: int = Field(default=100, ge=2)
     warm_up: int = Field(default=20, ge=0)
     weight_floor: float | None = Field(default=0.004, gt=0.0)
+    mirror: bool = False
+    coarse_epochs: int = Field(default=0, ge=0)
     threads: int = Field(default=1, ge=1)
 
 

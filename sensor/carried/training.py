@@ -22,6 +22,7 @@ from sensor.carried.recipe import CarriedRecipe
 from sensor.carried.streams import Chunk, Sequence4, Streams
 from sensor.dataset import Run, read_runs, split
 from sensor.errors import SensorError
+from sensor.mirror import mirrored
 from sensor.provenance import versions
 
 DEVIATION_SHARE = (
@@ -44,7 +45,7 @@ class Progression:
 
 def train(
     recipe: CarriedRecipe,
-    data: Path,
+    data: Path | Sequence[Path],
     out: Path,
     resume: bool,
     progress: Callable[[int, int, str], None] = lambda done, total, text: None,
@@ -56,7 +57,8 @@ def train(
     """
     from sensor.carried.graph import export_carried
 
-    runs = read_runs(data, recipe.runs)
+    directories = [data] if isinstance(data, Path) else data
+    runs = [run for directory in directories for run in read_runs(directory, recipe.runs)]
     out.mkdir(parents=True, exist_ok=True)
     training, validation = split(runs, recipe.hold_out)
     trainer = Trainer(recipe, training, validation)
@@ -104,9 +106,15 @@ class Trainer:
             self.network.parameters(), lr=recipe.training.learning_rate
         )
         self.reached = Progression()
-        self._sequences = self._prepared(training, 0)
+        # Each run as it was and, if the recipe says so, as its mirror image
+        self._images = [training]
+        if recipe.training.mirror:
+            self._images.append([mirrored(run) for run in training])
+        sequences = [self._prepared(runs, 0) for runs in self._images]
+        self._normalise(sequences)
+        # Exact channels are the same in every epoch
+        self._lasting = sequences if recipe.condition == "ideal" else None
         self._validation = self._prepared(validation, -1)
-        self._normalise()
 
     def build(self) -> CarriedNetwork:
         """Return a network of the recipe's shape, its weights drawn."""
@@ -131,9 +139,9 @@ class Trainer:
             prepared.append(Sequence4(self.features(run, measured), run.truth, weight))
         return prepared
 
-    def _normalise(self) -> None:
-        """Mean and deviation of the features over all training samples, run by run."""
-        parts = [s.features[:, :-1] for s in self._sequences]  # without the level
+    def _normalise(self, images: Sequence[Sequence[Sequence4]]) -> None:
+        """Mean and deviation of the features, without the level, over all training samples."""
+        parts = [sequence.features[:, :-1] for image in images for sequence in image]
         count = sum(len(part) for part in parts)
         mean = sum(part.sum(axis=0, dtype=np.float64) for part in parts) / count
         square = sum(np.square(part - mean).sum(axis=0, dtype=np.float64) for part in parts)
@@ -146,19 +154,25 @@ class Trainer:
         """Train one epoch, validate, keep the weights if they are the best so far."""
         begin = time.perf_counter()
         settings = self.recipe.training
-        if epoch and self.recipe.condition != "ideal":
-            self._sequences = self._prepared(self.runs, epoch)
         random = np.random.default_rng([self.recipe.seed, epoch])
         streams = Streams(settings.streams, settings.chunk, settings.warm_up)
-        chunks = list(streams.chunks(self._sequences, random))
+        chunks = list(streams.chunks(self._played(epoch, random), random))
         squares = 0.0
         state: State | None = None
         self.network.train()
+        self.network.coarse = epoch < settings.coarse_epochs
         for number, chunk in enumerate(chunks):
             self._set_rate((epoch + number / len(chunks)) / settings.epochs)
             error, state = self._step(chunk, state)
             squares += error
         self._judge(epoch, math.sqrt(squares / len(chunks)), time.perf_counter() - begin)
+
+    def _played(self, epoch: int, random: np.random.Generator) -> list[Sequence4]:
+        """Every run, or its mirror image, as measured in this epoch."""
+        images = random.integers(len(self._images), size=len(self.runs))
+        if self._lasting is not None:
+            return [self._lasting[image][i] for i, image in enumerate(images)]
+        return self._prepared([self._images[image][i] for i, image in enumerate(images)], epoch)
 
     def _step(self, chunk: Chunk, state: State | None) -> tuple[float, State]:
         """One step of the optimiser; return the mean weighted square error and the next state."""
@@ -211,6 +225,7 @@ class Trainer:
         and the factors (4,) with which 90 % of their samples lie within 1.645 predicted deviations.
         """
         self.network.eval()
+        self.network.coarse = False
         squares, ratios = [], []
         part = slice(self.recipe.training.warm_up, None)
         for sequence in self._validation:
