@@ -250,7 +250,7 @@ def recipes() -> dict[str, tuple[Recipe, list[PlannedRun]]]:
 
 def test_no_seed_is_in_two_recipes_or_in_a_scenario(recipes: Recipes) -> None:
     """Surfaces, roads, mixes and dampers of the evaluation were never trained on."""
-    assert set(recipes) == {"paper", "own", "evaluation", "hour"}
+    assert set(recipes) == {"paper", "own", "harder", "evaluation", "hour"}
     seeds = [run.seed for _, runs in recipes.values() for run in runs]
     assert len(set(seeds)) == len(seeds)
     assert len({recipe.seed for recipe, _ in recipes.values()}) == len(recipes)
@@ -269,7 +269,7 @@ def test_the_recipe_of_the_published_network(recipes: Recipes) -> None:
 
 @pytest.fixture(scope="module")
 def training(recipes: Recipes) -> Training:
-    _, runs = recipes["own"]
+    runs = [run for name in ("own", "harder") for run in recipes[name][1]]
     return [(run, load_with(run.scenario, run.overrides)) for run in runs]
 
 
@@ -279,7 +279,7 @@ def test_the_papers_testing_manoeuvres_are_never_trained_on(
     """Nor is anything within 5 % of their radius, spacing, or angle at their speed."""
     tested = {path.name for path in (DATASETS.parent / "paper").glob("*.yaml")}
     laps = {name for name in tested if name.startswith(("heilbronn", "rural"))}
-    for _, runs in (recipes["paper"], recipes["own"]):
+    for _, runs in (recipes["paper"], recipes["own"], recipes["harder"]):
         used = {run.scenario.name for run in runs if run.scenario.parent.name == "paper"}
         assert used <= laps | (
             {n for n in tested if "hockenheim" in n} if "1" in runs[0].stem else used
@@ -318,7 +318,7 @@ def test_the_projects_training_is_broad(training: Training) -> None:
     assert {*drawn["road.friction"]} >= {1, 0.4}
     for name in ("load", "damper_scale"):
         nominal = 0 if name == "load" else 1
-        assert 0.5 < drawn[name].count(nominal) / len(runs) < 0.8
+        assert 0.4 < drawn[name].count(nominal) / len(runs) < 0.8
     straight = [s.driver.speed_kmh for r, s in runs if r.scenario.stem == "straight"]
     assert min(straight) < 25
     assert max(straight) > 110

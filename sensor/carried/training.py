@@ -17,12 +17,12 @@ import numpy.typing as npt
 import torch
 
 from sensor.carried.features import features
+from sensor.carried.mirror import Mirror
 from sensor.carried.network import SCALE, CarriedConfig, CarriedNetwork, State
 from sensor.carried.recipe import CarriedRecipe
 from sensor.carried.streams import Chunk, Sequence4, Streams
 from sensor.dataset import Run, read_runs, split
 from sensor.errors import SensorError
-from sensor.mirror import mirrored
 from sensor.provenance import versions
 
 DEVIATION_SHARE = (
@@ -106,11 +106,8 @@ class Trainer:
             self.network.parameters(), lr=recipe.training.learning_rate
         )
         self.reached = Progression()
-        # Each run as it was and, if the recipe says so, as its mirror image
-        self._images = [training]
-        if recipe.training.mirror:
-            self._images.append([mirrored(run) for run in training])
-        sequences = [self._prepared(runs, 0) for runs in self._images]
+        self._mirror = Mirror(self.network.config.features) if recipe.training.mirror else None
+        sequences = self._prepared(training, 0)
         self._normalise(sequences)
         # Exact channels are the same in every epoch
         self._lasting = sequences if recipe.condition == "ideal" else None
@@ -139,9 +136,9 @@ class Trainer:
             prepared.append(Sequence4(self.features(run, measured), run.truth, weight))
         return prepared
 
-    def _normalise(self, images: Sequence[Sequence[Sequence4]]) -> None:
+    def _normalise(self, sequences: Sequence[Sequence4]) -> None:
         """Mean and deviation of the features, without the level, over all training samples."""
-        parts = [sequence.features[:, :-1] for image in images for sequence in image]
+        parts = [sequence.features[:, :-1] for sequence in sequences]
         count = sum(len(part) for part in parts)
         mean = sum(part.sum(axis=0, dtype=np.float64) for part in parts) / count
         square = sum(np.square(part - mean).sum(axis=0, dtype=np.float64) for part in parts)
@@ -168,11 +165,12 @@ class Trainer:
         self._judge(epoch, math.sqrt(squares / len(chunks)), time.perf_counter() - begin)
 
     def _played(self, epoch: int, random: np.random.Generator) -> list[Sequence4]:
-        """Every run, or its mirror image, as measured in this epoch."""
-        images = random.integers(len(self._images), size=len(self.runs))
-        if self._lasting is not None:
-            return [self._lasting[image][i] for i, image in enumerate(images)]
-        return self._prepared([self._images[image][i] for i, image in enumerate(images)], epoch)
+        """Every run as measured in this epoch, or, as likely, its mirror image."""
+        runs = self._lasting or self._prepared(self.runs, epoch)
+        if self._mirror is None:
+            return runs
+        turned = random.integers(2, size=len(runs))
+        return [self._mirror.image(run) if t else run for run, t in zip(runs, turned, strict=True)]
 
     def _step(self, chunk: Chunk, state: State | None) -> tuple[float, State]:
         """One step of the optimiser; return the mean weighted square error and the next state."""
