@@ -19,7 +19,7 @@ from sensor.baselines import StillWheels
 from sensor.channels import COMMANDS, ROAD, STAGE
 from sensor.dataset import Run, read_run, write_run
 from sensor.evaluation import WARM_UP, Estimate, evaluate_run, figures, measured_channels
-from sensor.fingerprint import fingerprint
+from sensor.fingerprint import fingerprint, sources
 from sensor.metrics import THETA0
 
 Array = npt.NDArray[np.float64]
@@ -189,6 +189,15 @@ def test_fingerprints_tell_estimators_and_conditions_apart() -> None:
     assert fingerprint("zero", "ideal") == fingerprint("zero", "ideal")
     with pytest.raises(SensorError, match="no estimator"):
         fingerprint("zeru", "ideal")
+
+
+def test_a_fingerprint_covers_what_the_estimator_imports_and_no_other() -> None:
+    """A change of the training, or of another estimator, spoils no figures."""
+    kalman, zero = sources("kalman_imu", "ideal"), sources("zero", "ideal")
+    assert {"sensor.kalman.filter", "sensor.evaluation", "sensor.metrics.modes"} <= kalman.keys()
+    assert not [name for name in kalman if "carried" in name or "training" in name]
+    assert kalman.keys() - zero.keys() > {"sensor.kalman.filter", "sensor.kalman.delay"}
+    assert all(path.is_file() for path in kalman.values())
 
 
 def test_command(runs: Path, tmp_path: Path) -> None:
