@@ -98,18 +98,9 @@ def train(training: Training) -> None:
 
 def export(checkpoint: Path, path: Path) -> None:
     """Write the network of a checkpoint as ONNX; raises SensorError if it is none."""
-    import pickle
+    from sensor.checkpoint import read
 
-    import torch
-
-    if not checkpoint.is_file():
-        raise SensorError(f"{checkpoint}: there is no such checkpoint.")
-    try:
-        recipe = json.loads(torch.load(checkpoint, weights_only=True)["recipe"])
-    except (KeyError, RuntimeError, TypeError, ValueError, pickle.UnpicklingError) as error:
-        raise SensorError(
-            f"{checkpoint}: it is no checkpoint of a training ({type(error).__name__})."
-        ) from error
+    recipe = json.loads(read(checkpoint)["recipe"])
     _chosen(EXPORT, recipe.get("family"), checkpoint)(checkpoint, path)
 
 

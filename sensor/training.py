@@ -5,12 +5,10 @@ Every random draw depends on (seed, epoch) alone, so a training resumed from its
 the same weights as one that was never interrupted.
 """
 
-import json
 import math
-import pickle
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
+from sensor import checkpoint
+from sensor.checkpoint import Progression
 from sensor.dataset import Run, WindowSet
 from sensor.errors import SensorError
 from sensor.network import BiLstmNetwork, NetworkConfig
@@ -27,18 +27,6 @@ from sensor.recipe import Recipe, TrainingRecipe, read_recipe
 from sensor.training_data import as_seen, read_parts, window_sets
 
 _VALIDATION_BATCH = 2048
-
-
-@dataclass
-class Progression:
-    """What has been reached: a record per epoch, the best validation RMSE [m/s], and the weights
-    that gave it.
-    """
-
-    epochs: list[dict[str, float]] = field(default_factory=list)
-    best_rmse: float = math.inf
-    best_epoch: int = 0
-    best_weights: dict[str, torch.Tensor] = field(default_factory=dict)
 
 
 def train(
@@ -70,8 +58,8 @@ def fit(
     """
     trainer = Trainer.of(recipe, *window_sets(recipe, training, validation))
     network = trainer.network
-    if resume and (out / "checkpoint.pt").is_file():
-        trainer.load(out / "checkpoint.pt")
+    if resume and (out / checkpoint.NAME).is_file():
+        checkpoint.load(trainer, out / checkpoint.NAME)
     description = _describe(recipe, training, validation)
     total = recipe.training.epochs
     with epochs(total) as tell:
@@ -82,8 +70,8 @@ def fit(
                 normalisation = trainer.training.normalisation
                 trainer.training = WindowSet(seen, recipe.network.window, normalisation)
             trainer.run_epoch(epoch)
-            trainer.save(out / "checkpoint.pt")
-            _write_json(out / "training.json", description | trainer.record())
+            checkpoint.save(trainer, out / checkpoint.NAME)
+            checkpoint.write_record(description | trainer.record(), out)
         tell(total, total, trainer.summary())
     network.load_state_dict(trainer.reached.best_weights)
     return network.eval(), description | trainer.record()
@@ -137,8 +125,8 @@ class Trainer:
                 "seconds": round(time.perf_counter() - start, 3),
             }
         )
-        if validation_rmse < reached.best_rmse:
-            reached.best_rmse, reached.best_epoch = validation_rmse, epoch + 1
+        if validation_rmse < reached.best:
+            reached.best, reached.best_epoch = validation_rmse, epoch + 1
             state = self.network.state_dict()
             reached.best_weights = {name: value.clone() for name, value in state.items()}
 
@@ -177,32 +165,6 @@ class Trainer:
         bf16 = self.recipe.training.precision == "bf16"
         return torch.autocast("cpu", torch.bfloat16, enabled=bf16)
 
-    def save(self, path: Path) -> None:
-        """Write the checkpoint, whole or not at all."""
-        temporary = path.with_suffix(".part")
-        torch.save(
-            {
-                "recipe": self.recipe.model_dump_json(),
-                "network": self.network.state_dict(),
-                "optimiser": self.optimiser.state_dict(),
-                "reached": asdict(self.reached),
-            },
-            temporary,
-        )
-        temporary.replace(path)
-
-    def load(self, path: Path) -> None:
-        """Go on from a checkpoint; raises SensorError if it belongs to another recipe."""
-        checkpoint = torch.load(path, weights_only=True)
-        # A longer training of the same recipe may go on from here, so `epochs` may differ.
-        if _without_epochs(Recipe.model_validate_json(checkpoint["recipe"])) != _without_epochs(
-            self.recipe
-        ):
-            raise SensorError(f"{path}: the checkpoint was made by another recipe.")
-        self.network.load_state_dict(checkpoint["network"])
-        self.optimiser.load_state_dict(checkpoint["optimiser"])
-        self.reached = Progression(**checkpoint["reached"])
-
     def summary(self) -> str:
         """One short line for the progress display."""
         if not self.reached.epochs:
@@ -210,14 +172,14 @@ class Trainer:
         last = self.reached.epochs[-1]
         return (
             f"epoch {last['epoch']:.0f}: validation {1e3 * last['validation_rmse']:.2f} mm/s, "
-            f"best {1e3 * self.reached.best_rmse:.2f} (epoch {self.reached.best_epoch})"
+            f"best {1e3 * self.reached.best:.2f} (epoch {self.reached.best_epoch})"
         )
 
     def record(self) -> dict[str, Any]:
         """What `training.json` says of the course of the training."""
         return {
             "best_epoch": self.reached.best_epoch,
-            "best_validation_rmse": self.reached.best_rmse,
+            "best_validation_rmse": self.reached.best,
             "epochs": self.reached.epochs,
         }
 
@@ -236,27 +198,15 @@ def network_of(recipe: Recipe) -> BiLstmNetwork:
     )
 
 
-def export_checkpoint(checkpoint: Path, path: Path) -> Path:
-    """Write the best network so far of a training as ONNX; return the path.
-
-    Raises SensorError if the file is no checkpoint of a windowed network.
+def export_checkpoint(path: Path, out: Path) -> None:
+    """Write the best network so far of a training as ONNX to `out`; raises SensorError if there is
+    none yet.
     """
     from sensor.export import export_windowed
 
-    try:
-        content = torch.load(checkpoint, weights_only=True)
-        recipe = Recipe.model_validate_json(content["recipe"])
-        network = network_of(recipe)
-        network.load_state_dict(content["reached"]["best_weights"])
-    except (OSError, KeyError, RuntimeError, ValueError, pickle.UnpicklingError) as error:
-        raise SensorError(
-            f"{checkpoint}: it is no checkpoint of a windowed network ({type(error).__name__})."
-        ) from error
-    record = {"recipe": recipe.model_dump(mode="json"), "versions": versions()}
-    beside = checkpoint.with_name("training.json")
-    if beside.is_file():
-        record = json.loads(beside.read_text(encoding="utf-8"))
-    return export_windowed(network.eval(), path, training=record)
+    network = network_of(Recipe.model_validate_json(checkpoint.read(path)["recipe"]))
+    network.load_state_dict(checkpoint.best_weights(path))
+    export_windowed(network.eval(), out, training=checkpoint.record_beside(path))
 
 
 def learning_rate(settings: TrainingRecipe, epoch: int) -> float:
@@ -268,10 +218,6 @@ def learning_rate(settings: TrainingRecipe, epoch: int) -> float:
     return settings.learning_rate
 
 
-def _without_epochs(recipe: Recipe) -> dict[str, Any]:
-    return recipe.model_dump(exclude={"training": {"epochs"}})
-
-
 def _describe(recipe: Recipe, training: Sequence[Run], validation: Sequence[Run]) -> dict[str, Any]:
     """What `training.json` says of recipe, versions and data."""
     data = {
@@ -279,7 +225,3 @@ def _describe(recipe: Recipe, training: Sequence[Run], validation: Sequence[Run]
         for part, runs in (("training", training), ("validation", validation))
     }
     return {"recipe": recipe.model_dump(mode="json"), "versions": versions(), "samples": data}
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

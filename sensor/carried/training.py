@@ -4,11 +4,9 @@ Every random draw depends on (seed, epoch) alone, so a training resumed from its
 the same weights as one that was never interrupted.
 """
 
-import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +14,13 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
+from sensor import checkpoint
 from sensor.carried.features import features
 from sensor.carried.mirror import Mirror
 from sensor.carried.network import SCALE, CarriedConfig, CarriedNetwork, State
 from sensor.carried.recipe import CarriedRecipe
 from sensor.carried.streams import Chunk, Sequence4, Streams
+from sensor.checkpoint import Progression
 from sensor.dataset import Run, read_runs, split
 from sensor.errors import SensorError
 from sensor.provenance import versions
@@ -31,16 +31,6 @@ DEVIATION_SHARE = (
 COVERAGE, SIGMAS = 0.90, 1.645  # of a normal distribution
 LARGEST_GRADIENT = 1.0
 LEAST_DEVIATION = 1e-6  # m/s
-
-
-@dataclass
-class Progression:
-    """What has been reached: a record per epoch and the best validation error (ratio)."""
-
-    epochs: list[dict[str, float]] = field(default_factory=list)
-    best: float = math.inf
-    best_epoch: int = 0
-    best_weights: dict[str, torch.Tensor] = field(default_factory=dict)
 
 
 def train(
@@ -62,34 +52,30 @@ def train(
     out.mkdir(parents=True, exist_ok=True)
     training, validation = split(runs, recipe.hold_out)
     trainer = Trainer(recipe, training, validation)
-    if resume and (out / "checkpoint.pt").is_file():
-        trainer.load(out / "checkpoint.pt")
+    if resume and (out / checkpoint.NAME).is_file():
+        checkpoint.load(trainer, out / checkpoint.NAME)
     total = recipe.training.epochs
     for epoch in range(len(trainer.reached.epochs), total):
         trainer.run_epoch(epoch)
-        trainer.save(out / "checkpoint.pt")
-        (out / "training.json").write_text(json.dumps(trainer.record(), indent=1) + "\n", "utf-8")
+        checkpoint.save(trainer, out / checkpoint.NAME)
+        checkpoint.write_record(trainer.record(), out)
         progress(epoch + 1, total, trainer.summary())
     network = trainer.finished()
-    (out / "training.json").write_text(json.dumps(trainer.record(), indent=1) + "\n", "utf-8")
+    checkpoint.write_record(trainer.record(), out)
     export_carried(network, out / f"{recipe.name}.onnx", trainer.record())
     return network
 
 
-def export_checkpoint(checkpoint: Path, path: Path) -> None:
-    """Write the best network of a checkpoint as ONNX to `path`; raises SensorError if the file is
-    none of this family.
+def export_checkpoint(path: Path, out: Path) -> None:
+    """Write the best network so far of a training as ONNX to `out`; raises SensorError if there is
+    none yet.
     """
     from sensor.carried.graph import export_carried
 
-    content = torch.load(checkpoint, weights_only=True)
-    recipe = CarriedRecipe.model_validate_json(content["recipe"])
-    shape, reached = recipe.network, Progression(**content["reached"])
-    if not reached.best_weights:
-        raise SensorError(f"{checkpoint}: no epoch has been finished yet.")
+    shape = CarriedRecipe.model_validate_json(checkpoint.read(path)["recipe"]).network
     network = CarriedNetwork(CarriedConfig(shape.front, shape.units, shape.hidden))
-    network.load_state_dict(reached.best_weights)
-    export_carried(network.eval(), path, {"recipe": recipe.model_dump(mode="json")})
+    network.load_state_dict(checkpoint.best_weights(path))
+    export_carried(network.eval(), out, checkpoint.record_beside(path))
 
 
 class Trainer:
@@ -239,29 +225,6 @@ class Trainer:
         """Return the network of the best epoch, its deviation calibrated on the runs held out."""
         self.network.load_state_dict(self.reached.best_weights)
         return self.network.eval()
-
-    def save(self, path: Path) -> None:
-        """Write the checkpoint, whole or not at all."""
-        temporary = path.with_suffix(".part")
-        torch.save(
-            {
-                "recipe": self.recipe.model_dump_json(),
-                "network": self.network.state_dict(),
-                "optimiser": self.optimiser.state_dict(),
-                "reached": asdict(self.reached),
-            },
-            temporary,
-        )
-        temporary.replace(path)
-
-    def load(self, path: Path) -> None:
-        """Go on from a checkpoint; raises SensorError if it belongs to another recipe."""
-        checkpoint = torch.load(path, weights_only=True)
-        if CarriedRecipe.model_validate_json(checkpoint["recipe"]) != self.recipe:
-            raise SensorError(f"{path}: the checkpoint was made by another recipe.")
-        self.network.load_state_dict(checkpoint["network"])
-        self.optimiser.load_state_dict(checkpoint["optimiser"])
-        self.reached = Progression(**checkpoint["reached"])
 
     def summary(self) -> str:
         """One line on the last epoch."""

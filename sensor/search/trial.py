@@ -57,7 +57,7 @@ class WindowObjective:
             if falls_behind(self._recipe.stop, trial.study, epoch + 1, reached):
                 break
         trial.set_user_attr("epochs", len(trainer.reached.epochs))
-        return trainer.reached.best_rmse
+        return trainer.reached.best
 
 
 def falls_behind(stop: EarlyStop | None, study: Study, epoch: int, reached: float) -> bool:
