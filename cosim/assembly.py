@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from cosim import loop
 from cosim.comfort import ride_figures
-from cosim.controller import FixedDampers, Skyhook, damper_map
+from cosim.control.choice import controller_of
+from cosim.control.damper_map import damper_map
 from cosim.course import Course, course_of
 from cosim.driver import PathDriver
 from cosim.errors import InputError, Problem
@@ -36,15 +37,13 @@ from cosim.quantities import (
     Quantity,
 )
 from cosim.recorder import Recorder, Signal
-from cosim.scenario.controllers import Passive
-from cosim.scenario.controllers import Skyhook as SkyhookSettings
+from cosim.scenario.controllers import Controller, Passive
 from cosim.scenario.schema import Scenario
 from cosim.sensor import estimator_file, estimator_of, measurement_of, stage_problems
 from cosim.start import builtin_start, checked_parameters
 from cosim.vehicle import Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
 from sensor import CHANNELS, OUTPUTS, SAMPLE_RATE_HZ, Channel
-from sensor.channels import PASSIVE_COMMAND
 from sensor.conditions import PRODUCTION_PARAMETERS, Condition
 
 Array = npt.NDArray[np.float64]
@@ -119,13 +118,14 @@ def check(scenario: Scenario) -> float:
     wrong, `FmuError` or `NetworkError` for a file that does not load.
     """
     *_, plan = checked_parts(scenario)
-    estimator_file(scenario)
+    for controller in scenario.controllers:
+        estimator_file(scenario, controller.sensor_of_run(scenario.sensor))
     return _steps(scenario, plan)[0] * STEP_S
 
 
 def assemble(
     scenario: Scenario,
-    controller: Passive | SkyhookSettings,
+    controller: Controller,
     sensor: SensorBlock | None = None,
     dampers: ControllerBlock | None = None,
     roads: Path | None = None,
@@ -140,11 +140,12 @@ def assemble(
     wiring, description, course, plan = checked_parts(scenario, roads)
     file = None
     if sensor is None:
-        file = estimator_file(scenario)
-        sensor = estimator_of(scenario)
+        settings = controller.sensor_of_run(scenario.sensor)
+        file = estimator_file(scenario, settings)
+        sensor = estimator_of(scenario, settings)
     passive = isinstance(controller, Passive) and dampers is None
     start = _start_values(scenario, description, course, plan, passive)
-    block = dampers or _controller(scenario, controller)
+    block = dampers or controller_of(controller, damper_map(scenario.parameters))
     steps, if_late = _steps(scenario, plan)
     driver = plan.driver(STEP_S, friction_of(scenario))
     recorder = Recorder(record_groups(scenario.sensor.condition), steps + 1, STEP_S)
@@ -256,17 +257,6 @@ def _start_values(
     own = {**PRODUCTION_PARAMETERS, **own}
     known = {name: value for name, value in own.items() if name in description.variables}
     return known | scenario.parameters
-
-
-def _controller(scenario: Scenario, settings: Passive | SkyhookSettings) -> ControllerBlock:
-    if isinstance(settings, Passive):
-        return FixedDampers(PASSIVE_COMMAND)
-    return Skyhook(
-        settings.feedback == "truth",
-        settings.gain_ns_per_m,
-        settings.initial_command,
-        damper_map(scenario.parameters),
-    )
 
 
 def _check_length(scenario: Scenario, plan: Plan) -> None:

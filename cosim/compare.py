@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cosim.controller import held
 from cosim.metrics import BASELINES, WHEELS
-from cosim.recorder import Recorder
+from cosim.recorder import Recorder, held
 from sensor import SensorError, evaluate
 from sensor.conditions import Condition
 from sensor.estimator import Estimator

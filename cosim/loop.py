@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from cosim.control.sample import Sample
 from cosim.recorder import Recorder
 from cosim.vehicle import State
 
@@ -73,8 +74,8 @@ class ControllerBlock(Protocol):
 
     command: Array
 
-    def step(self, measured: Array, estimate: Array, valid: bool, truth: Array) -> Array:
-        """Return the damper commands (4,), 0 soft to 1 hard."""
+    def step(self, sample: Sample) -> Array:
+        """Return the damper commands (4,), 0 soft to 1 hard, from what is known at t_k."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +102,14 @@ def run(
     vehicle, driver, measurement = blocks.vehicle, blocks.driver, blocks.measurement
     sensor, controller = blocks.sensor, blocks.controller
     command = controller.command  # the vehicle stands at t_0 with the initial one
+    sample = Sample()
     for k in range(steps + 1):
         state = vehicle.read()  # vehicle -> outputs at t_k
         vehicle.check_finite(k)
         measured = measurement.step(state.channels, state.stage)  # outputs -> channels of a car
         valid = sensor.step(measured, command)  # channels -> estimates, or invalid
-        command = controller.step(measured, sensor.estimate, valid, state.truth)
+        sample.renewed(measured, sensor.estimate, sensor.deviation, valid, state.truth)
+        command = controller.step(sample)  # what is known -> damper commands
         pedals = driver.step(k, state)
         ideal = NOTHING if measured is state.channels else state.channels
         recorder.append(

@@ -45,6 +45,17 @@ def provenance(files: Mapping[str, Path | None], command: str = "") -> dict[str,
     }
 
 
+def add_files(versions: dict[str, Any], files: Mapping[str, Path], run: str) -> None:
+    """Add the files of one more run to the content of versions.json; one that another run has in
+    the same role stands there once.
+    """
+    known = versions["files"]
+    for role, path in files.items():
+        name = role if known.get(role, {}).get("path", str(path)) == str(path) else f"{role} {run}"
+        if name not in known:
+            known[name] = {"path": str(path), "sha256": sha256(path)}
+
+
 def sha256(path: Path) -> str:
     """Return the SHA-256 of a file as hexadecimal digits."""
     with path.open("rb") as stream:

@@ -147,6 +147,13 @@ class Recorder:
         pq.write_table(pa.Table.from_arrays(columns, schema=pa.schema(fields)), path)
 
 
+def held(commands: Array, initial: Array) -> Array:
+    """Return the commands (rows, 4) that were held until each row: a record's `commands` (rows, 4),
+    each held from its row on, with `initial` (4,) before them.
+    """
+    return np.vstack([initial, commands])[: len(commands)]
+
+
 def require_parquet() -> None:
     """Raise `InputError` with what to do where Parquet cannot be written."""
     import importlib.util

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from cosim.errors import InputError, NetworkError
 from cosim.limits import Bounds, Verdict, evaluate, on_surface
 from cosim.recorder import Recorder, require_parquet
-from cosim.scenario.controllers import Passive, Skyhook
+from cosim.scenario.controllers import Controller
 from cosim.scenario.paper_row import row_of
 from cosim.scenario.schema import Scenario
 
@@ -96,7 +96,7 @@ class Assembly(Protocol):
         """Run to the end; `progress` is told steps done and steps at most."""
 
 
-Assemble = Callable[[Scenario, "Passive | Skyhook"], Assembly]
+Assemble = Callable[[Scenario, Controller], Assembly]
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def execute(
     (default: `cosim.assembly.assemble`). Raises `InputError` for what a user can mend, `FmuError`
     or `NetworkError` for a block that fails; rows recorded until then are written first.
     """
-    from cosim.provenance import provenance
+    from cosim.provenance import add_files, provenance
 
     if scenario.output.format == "parquet":
         require_parquet()
@@ -155,8 +155,9 @@ def execute(
         with _network_errors():
             assembly = assemble(scenario, controller)
         if not versions:
-            versions = provenance({"scenario": scenario.file, **assembly.files}, command)
-            _write_json(output_dir / "versions.json", versions)
+            versions = provenance({"scenario": scenario.file}, command)
+        add_files(versions, assembly.files, controller.label)
+        _write_json(output_dir / "versions.json", versions)
         folder = output_dir if len(scenario.controllers) == 1 else output_dir / controller.label
         runs.append(_run(scenario, controller, assembly, folder, progress))
     outcome = _judge(scenario, output_dir, tuple(runs))
@@ -199,7 +200,7 @@ def _prepare(output_dir: Path, scenario: Scenario) -> None:
 
 def _run(
     scenario: Scenario,
-    controller: Passive | Skyhook,
+    controller: Controller,
     assembly: Assembly,
     folder: Path,
     progress: Progress | None,

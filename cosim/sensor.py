@@ -14,14 +14,14 @@ from sensor.estimators import make, model_file, open_network
 
 if TYPE_CHECKING:
     from cosim.scenario.schema import Scenario
+    from cosim.scenario.sensor import Sensor
     from sensor.estimator import Estimator
 
 
-def estimator_file(scenario: Scenario) -> Path | None:
-    """Return the file of the scenario's network or estimator, None for an estimator without one;
+def estimator_file(scenario: Scenario, settings: Sensor) -> Path | None:
+    """Return the file of a sensor's network or estimator, None for an estimator without one;
     raises `NetworkError` where none is shipped.
     """
-    settings = scenario.sensor
     if settings.network is not None:
         return scenario.resolve(settings.network)
     try:
@@ -30,9 +30,8 @@ def estimator_file(scenario: Scenario) -> Path | None:
         raise NetworkError(str(error)) from None
 
 
-def estimator_of(scenario: Scenario) -> Estimator:
-    """Return the scenario's estimator, fresh; raises `NetworkError` where its file does not fit."""
-    settings = scenario.sensor
+def estimator_of(scenario: Scenario, settings: Sensor) -> Estimator:
+    """Return a sensor's estimator, fresh; raises `NetworkError` where its file does not fit."""
     try:
         if settings.network is None:
             return make(str(settings.estimator), settings.condition)

@@ -11,7 +11,7 @@ from foreign_fmu import ECHO, Variable, own_variables, parrot
 from loop_rig import Blind, Guess, write_scenario
 
 from cosim.assembly import Assembly, assemble, record_groups
-from cosim.controller import FixedDampers
+from cosim.control.fixed import FixedDampers
 from cosim.errors import InputError, NetworkError
 from cosim.road import Smooth, build_road, load_track
 from cosim.scenario.load import load

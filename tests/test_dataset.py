@@ -12,7 +12,7 @@ from loop_rig import write_scenario
 
 from cosim.assembly import assemble
 from cosim.cli import main
-from cosim.controller import SwitchingDampers
+from cosim.control.switching import SwitchingDampers
 from cosim.dataset import NoSensor
 from cosim.dataset.build import missing
 from cosim.dataset.drive import drive

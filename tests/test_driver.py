@@ -14,7 +14,7 @@ import pytest
 from loop_rig import Blind
 
 from cosim.assembly import STEP_S, record_groups
-from cosim.controller import FixedDampers
+from cosim.control.fixed import FixedDampers
 from cosim.driver import PathDriver
 from cosim.driver_model import DriverModel
 from cosim.fmi import Description, Value

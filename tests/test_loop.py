@@ -16,11 +16,12 @@ from loop_rig import WINDOW, Blind, Guess, write_scenario
 
 from cosim.assembly import Assembly, assemble
 from cosim.cli import main
-from cosim.controller import SwitchingDampers, held
+from cosim.control.sample import Sample
+from cosim.control.switching import SwitchingDampers
 from cosim.errors import FmuError
 from cosim.loop import Blocks, ControllerBlock, MeasurementBlock, SensorBlock
 from cosim.loop import run as run_loop
-from cosim.recorder import Recorder, Signal
+from cosim.recorder import Recorder, Signal, held
 from cosim.run import execute
 from cosim.scenario.load import load
 from cosim.vehicle import State
@@ -88,12 +89,14 @@ class Counter:
         class Controller:
             command = np.full(4, 199.0)
 
-            def step(self, measured: Array, estimate: Array, valid: bool, truth: Array) -> Array:
+            def step(self, sample: Sample) -> Array:
                 counter.calls.append("controller")
-                assert estimate[0] == 100 + measured[0]
-                assert truth[0] == counter.error - measured[0]
-                assert valid == (measured[0] >= 2)
-                return np.full(4, 200 + measured[0])
+                now = sample.measured[0]
+                assert sample.estimate[0] == 100 + now
+                assert sample.deviation[0] == 500 + now
+                assert sample.truth[0] == counter.error - now
+                assert sample.valid == (now >= 2)
+                return np.full(4, 200 + now)
 
         return Controller()
 
@@ -442,7 +445,7 @@ def test_an_fmu_that_fails_ends_the_command_with_3(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = parrot_scenario(tmp_path, "Parrot.BadAt: 40, Parrot.BadOutput: 106")
-    monkeypatch.setattr("cosim.assembly.estimator_of", lambda scenario: Guess())
+    monkeypatch.setattr("cosim.assembly.estimator_of", lambda *_: Guess())
     out = tmp_path / "out"
     result = CliRunner().invoke(main, ["run", str(path), "--output-dir", str(out)])
     assert result.exit_code == 3

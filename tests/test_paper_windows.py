@@ -10,7 +10,7 @@ import pytest
 from loop_rig import Blind
 
 from cosim.assembly import assemble
-from cosim.controller import held
+from cosim.recorder import held
 from cosim.scenario.load import load
 from sensor.baselines.normal_equations import NormalEquations, Samples, Standard
 from sensor.channels import CHANNELS, ROAD, SAMPLE_RATE_HZ, STAGE

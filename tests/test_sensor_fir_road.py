@@ -9,7 +9,7 @@ import pytest
 from loop_rig import Blind
 
 from cosim.assembly import assemble
-from cosim.controller import held
+from cosim.recorder import held
 from cosim.scenario.load import load
 from sensor.ablation import ablation
 from sensor.baselines.fit import Shape, fit_best, pooled

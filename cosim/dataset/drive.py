@@ -101,7 +101,8 @@ def _assembled(planned: PlannedRun, roads: Path) -> Assembly:
 
 def _dampers(planned: PlannedRun) -> ControllerBlock | None:
     from cosim.assembly import STEP_S
-    from cosim.controller import FixedDampers, SwitchingDampers
+    from cosim.control.fixed import FixedDampers
+    from cosim.control.switching import SwitchingDampers
 
     if planned.dampers == "switching":
         return SwitchingDampers(planned.seed, STEP_S)
@@ -112,7 +113,7 @@ def run_of(recorder: Recorder, initial: Array, name: str, recipe: Mapping[str, A
     """Return what was recorded as a run of a data set; `initial` (4,) is the damper command before
     the first sample.
     """
-    from cosim.controller import held
+    from cosim.recorder import held
     from sensor.dataset import Run
 
     recorded = {

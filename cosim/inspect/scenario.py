@@ -113,10 +113,9 @@ def _entry(where: str, item: Any, origin: str) -> Iterator[Value]:
 
 def _files(scenario: Scenario, fmu: Path, road: Path) -> list[dict[str, str]]:
     from cosim.provenance import sha256
-    from cosim.sensor import estimator_file
 
     files: dict[str, Path | None] = {
-        "scenario": scenario.file, "vehicle": fmu, "road": road, "sensor": estimator_file(scenario),
+        "scenario": scenario.file, "vehicle": fmu, "road": road, **_sensors(scenario),
         **{f"variant {n}": p for n, p in scenario.variants.files.items()},
     }  # fmt: skip
     return [
@@ -124,6 +123,18 @@ def _files(scenario: Scenario, fmu: Path, road: Path) -> list[dict[str, str]]:
         for what, path in files.items()
         if path is not None
     ]
+
+
+def _sensors(scenario: Scenario) -> dict[str, Path | None]:
+    """Return the files of the sensor and of the estimators that runs have of their own."""
+    from cosim.sensor import estimator_file
+
+    files = {"sensor": estimator_file(scenario, scenario.sensor)}
+    for controller in scenario.controllers:
+        file = estimator_file(scenario, controller.sensor_of_run(scenario.sensor))
+        if file not in files.values():
+            files[f"sensor of {controller.label}"] = file
+    return files
 
 
 def _tables(facts: Facts, values: list[Value]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from cosim.errors import InputError, Place, Problem, did_you_mean
 from cosim.limits import check_metric
 from cosim.scenario.combinations import combination_problems
+from cosim.scenario.controllers import label_of
 from cosim.scenario.messages import problems_of
 from cosim.scenario.overrides import Override, apply_override, parse_override
 from cosim.scenario.schema import Scenario, json_schema
@@ -18,12 +19,15 @@ from cosim.scenario.source import Key, Source, read
 from cosim.scenario.variants import combine
 from sensor.paper import paper_rows
 
+_NETWORK: Final = (".onnx", "an ONNX network")
+FileField = tuple[Key, str | None, str, str]
 # Fields that name a file, the word that needs none, and the ending that the file must have.
-FILE_FIELDS: Final[tuple[tuple[Key, str | None, str, str], ...]] = (
+FILE_FIELDS: Final[tuple[FileField, ...]] = (
     (("road", "file"), None, ".crg", "an OpenCRG road"),
     (("vehicle", "fmu"), "builtin", ".fmu", "an FMU"),
-    (("sensor", "network"), None, ".onnx", "an ONNX network"),
+    (("sensor", "network"), None, *_NETWORK),
 )
+CONTROLLER_FILE_FIELDS: Final[tuple[FileField, ...]] = ((("network",), None, *_NETWORK),)
 
 
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
@@ -76,16 +80,26 @@ def _order(problem: Problem) -> tuple[int, int]:
 
 def _value(data: Any, key: Key) -> Any:
     for part in key:
-        if not isinstance(data, dict) or part not in data:
+        in_list = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        if not in_list and not (isinstance(data, dict) and part in data):
             return None
         data = data[part]
     return data
 
 
+def _file_fields(data: dict[str, Any]) -> Iterator[FileField]:
+    """Yield the fields that may name a file, those of each controller too."""
+    yield from FILE_FIELDS
+    controllers = data.get("controllers")
+    for i in range(len(controllers) if isinstance(controllers, list) else 0):
+        for key, word, ending, what in CONTROLLER_FILE_FIELDS:
+            yield ("controllers", i, *key), word, ending, what
+
+
 def _file_problems(data: dict[str, Any], source: Source) -> list[Problem]:
     """Check on the raw values, so that a wrong field elsewhere does not hide a missing file."""
     problems = []
-    for key, word, ending, what in FILE_FIELDS:
+    for key, word, ending, what in _file_fields(data):
         value = _value(data, key)
         if not isinstance(value, str) or not value or value == word:
             continue
@@ -122,10 +136,5 @@ def _name_problems(data: dict[str, Any], source: Source) -> list[Problem]:
 def _labels(data: dict[str, Any]) -> list[str]:
     """Names of the runs, as far as the raw values tell."""
     controllers = data.get("controllers")
-    labels = []
-    for item in controllers if isinstance(controllers, list) else ({"kind": "passive"},):
-        if isinstance(item, dict):
-            kind, feedback = item.get("kind"), item.get("feedback", "estimate")
-            default = "passive" if kind == "passive" else f"{kind}_{feedback}"
-            labels.append(str(item.get("name") or default))
-    return labels
+    items = controllers if isinstance(controllers, list) else ({"kind": "passive"},)
+    return [label_of(item) for item in items if isinstance(item, dict)]

@@ -23,6 +23,9 @@ def _check_estimator(value: object) -> object:
     raise PydanticCustomError("estimator", "must be {choices}", context)
 
 
+EstimatorName = Annotated[str, BeforeValidator(_check_estimator)]
+
+
 class Sensor(Model):
     """The virtual sensor: an estimator by name, or a network from a file."""
 

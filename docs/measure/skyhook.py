@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cosim.assembly import assemble
-from cosim.controller import FixedDampers, Skyhook
+from cosim.control.fixed import FixedDampers
+from cosim.control.skyhook import Skyhook
 from cosim.dataset import NoSensor
 from cosim.loop import ControllerBlock
 from cosim.scenario.controllers import Skyhook as SkyhookSettings

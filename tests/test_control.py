@@ -8,7 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from cosim.controller import DamperMap, FixedDampers, Skyhook, SwitchingDampers
+from cosim.control.damper_map import DamperMap
+from cosim.control.fixed import FixedDampers
+from cosim.control.sample import Sample
+from cosim.control.skyhook import Skyhook
+from cosim.control.switching import SwitchingDampers
 from cosim.fmi import Description, Slave, Value
 from cosim.road import Bumps, Smooth, build_road, load_track
 from cosim.vehicle import builtin_fmu
@@ -19,7 +23,23 @@ Array = npt.NDArray[np.float64]
 H = 0.01
 MAP = DamperMap()
 CORNERS = ("FL", "FR", "RL", "RR")
-NOTHING = np.zeros(14), np.full(4, np.nan), False, np.zeros(4)
+
+
+def sample(
+    measured: Array | None = None,
+    estimate: Array | None = None,
+    valid: bool = False,
+    truth: Array | None = None,
+) -> Sample:
+    """What is known of a car that stands still, but for what is given."""
+    nan = np.full(4, np.nan)
+    return Sample().renewed(
+        np.zeros(14) if measured is None else measured,
+        nan if estimate is None else estimate,
+        nan,
+        valid,
+        np.zeros(4) if truth is None else truth,
+    )
 
 
 class Known(BodyMotion):
@@ -53,13 +73,13 @@ def force(velocity: float, command: float, corner: int = 0) -> float:
 def test_fixed_dampers_stay(command: float) -> None:
     dampers = FixedDampers(command)
     for _ in range(3):
-        assert dampers.step(*NOTHING).tolist() == [command] * 4
+        assert dampers.step(sample()).tolist() == [command] * 4
 
 
 def switched(seed: int, samples: int = 20_000) -> Array:
     """Commands (samples, 4) of 200 s."""
     dampers = SwitchingDampers(seed, H)
-    return np.array([dampers.step(*NOTHING).copy() for _ in range(samples)])
+    return np.array([dampers.step(sample()).copy() for _ in range(samples)])
 
 
 def test_switching_is_given_by_the_seed_alone() -> None:
@@ -109,8 +129,8 @@ def test_dampers_switch_each_for_itself() -> None:
 def command_for(body: Array, relative: Array, gain: float = 3500.0, on_truth: bool = True) -> Array:
     skyhook = Skyhook(on_truth, gain, body=Known(*body))
     nan = np.full(4, np.nan)
-    parts = (nan, False, relative) if on_truth else (relative, True, nan)
-    return skyhook.step(np.zeros(14), *parts).copy()
+    known = sample(truth=relative) if on_truth else sample(None, relative, True, nan)
+    return skyhook.step(known).copy()
 
 
 @pytest.mark.parametrize("on_truth", [True, False], ids=["truth", "estimate"])
@@ -181,17 +201,17 @@ def test_beyond_the_map_it_goes_on_straight() -> None:
 
 def test_the_initial_command_is_held_until_an_estimate_is_valid() -> None:
     skyhook = Skyhook(False, initial=0.35, body=Known(0.5, 0.5, 0.5, 0.5))
-    invalid = np.zeros(14), np.full(4, np.nan), False, np.full(4, 0.3)
+    invalid = sample(truth=np.full(4, 0.3))
     for _ in range(20):
-        assert skyhook.step(*invalid).tolist() == [0.35] * 4
-    valid = skyhook.step(np.zeros(14), np.full(4, 0.3), True, np.zeros(4)).copy()
+        assert skyhook.step(invalid).tolist() == [0.35] * 4
+    valid = skyhook.step(sample(None, np.full(4, 0.3), True)).copy()
     assert (valid != 0.35).all()
-    np.testing.assert_array_equal(skyhook.step(*invalid), valid)  # the last one is the best guess
+    np.testing.assert_array_equal(skyhook.step(invalid), valid)  # the last one is the best guess
 
 
 def test_the_truth_needs_no_valid_estimate() -> None:
     skyhook = Skyhook(True, initial=0.35, body=Known(5.0, 5.0, 5.0, 5.0))
-    command = skyhook.step(np.zeros(14), np.full(4, np.nan), False, np.full(4, 0.3))
+    command = skyhook.step(sample(truth=np.full(4, 0.3)))
     assert command.tolist() == [1.0] * 4
 
 
@@ -202,10 +222,10 @@ def test_body_velocity_comes_from_the_channels_also_while_nothing_is_valid() -> 
     measured[:, 2] = 2.0 * np.sin(2 * np.pi * 1.2 * t)
     body = BodyMotion().apply(measured)
     late, early = Skyhook(False), Skyhook(False)
-    for k, sample in enumerate(measured):
+    for k, row in enumerate(measured):
         relative = np.full(4, 0.2 * np.sign(body[k, 0]))
-        one = late.step(sample, relative, k >= 100, np.zeros(4)).copy()
-        other = early.step(sample, relative, True, np.zeros(4))
+        one = late.step(sample(row, relative, k >= 100)).copy()
+        other = early.step(sample(row, relative, True))
         if k >= 100:
             np.testing.assert_array_equal(one, other)
     assert one.max() > 0
