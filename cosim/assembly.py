@@ -19,6 +19,7 @@ from cosim.control.damper_map import damper_map
 from cosim.course import Course, course_of
 from cosim.driver import PathDriver
 from cosim.errors import InputError, Problem
+from cosim.faults.assemble import damper_block, fault_block, late_sensor, over_gaps
 from cosim.fmi import Description, Value
 from cosim.grip import grip_figures
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
@@ -142,13 +143,14 @@ def assemble(
     if sensor is None:
         settings = controller.sensor_of_run(scenario.sensor)
         file = estimator_file(scenario, settings)
-        sensor = estimator_of(scenario, settings)
+        sensor = over_gaps(estimator_of(scenario, settings), scenario.faults)
+    sensor = late_sensor(sensor, scenario.latency)
     passive = isinstance(controller, Passive) and dampers is None
     start = _start_values(scenario, description, course, plan, passive)
     block = dampers or controller_of(controller, damper_map(scenario.parameters))
     steps, if_late = _steps(scenario, plan)
     driver = plan.driver(STEP_S, friction_of(scenario))
-    recorder = Recorder(record_groups(scenario.sensor.condition), steps + 1, STEP_S)
+    recorder = Recorder(record_groups_of(scenario), steps + 1, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, block.command)
     files = {"fmu": description.path, "sensor": file, "road": course.file}
     files |= {f"variant {name}": path for name, path in scenario.variants.files.items()}
@@ -156,7 +158,15 @@ def assemble(
         recorder=recorder,
         initial_command=block.command.copy(),
         files={name: path for name, path in files.items() if path is not None},
-        blocks=Blocks(vehicle, driver, measurement_of(scenario), sensor, block),
+        blocks=Blocks(
+            vehicle,
+            driver,
+            measurement_of(scenario),
+            sensor,
+            block,
+            fault_block(scenario.faults, scenario.seed),
+            damper_block(scenario.latency, block.command),
+        ),
         vehicle=vehicle,
         driver=driver,
         plan=plan,
@@ -165,15 +175,28 @@ def assemble(
     )
 
 
-def record_groups(condition: Condition = "ideal") -> list[tuple[str, list[Signal]]]:
-    """Return the groups of the record, in the order of the loop. The channels are those measured;
-    where they are not ideal, the ideal ones come last.
+def record_groups_of(scenario: Scenario) -> list[tuple[str, list[Signal]]]:
+    """Return the groups of the record of a scenario's run."""
+    late = scenario.latency.damper_ms > 0
+    return record_groups(scenario.sensor.condition, bool(scenario.faults), late)
+
+
+def record_groups(
+    condition: Condition = "ideal", faults: bool = False, late_dampers: bool = False
+) -> list[tuple[str, list[Signal]]]:
+    """Return the groups of the record, in the order of the loop. The channels are those that the
+    sensor gets; the ideal ones, those measured, and the commands that the dampers hold follow where
+    they differ.
     """
 
     def signals(quantities: tuple[Quantity, ...]) -> list[Signal]:
         return [Signal(q.name, q.unit if q.unit != "1" else "", q.description) for q in quantities]
 
-    ideal = [Signal(f"Ideal.{c.name}", c.unit, f"{c.description}, exactly") for c in CHANNELS]
+    def other(name: str, what: str, there: bool) -> list[Signal]:
+        made = (Signal(f"{name}.{c.name}", c.unit, f"{c.description}, {what}") for c in CHANNELS)
+        return list(made) if there else []
+
+    held = [Signal(f"Held.{q.name}", "", f"{q.description}, as it arrives") for q in DAMPERS]
     return [
         ("channels", signals(CHANNEL_QUANTITIES)),
         ("estimate", [Signal(o.name, o.unit, o.description) for o in OUTPUTS]),
@@ -183,7 +206,9 @@ def record_groups(condition: Condition = "ideal") -> list[tuple[str, list[Signal
         ("command", signals(DAMPERS)),
         ("driver", signals(DRIVER)),
         ("vehicle", signals(RECORDED)),
-        ("ideal", ideal if condition != "ideal" else []),
+        ("ideal", other("Ideal", "exactly", condition != "ideal")),
+        ("measured", other("Measured", "as the car measured it", faults)),
+        ("held", held if late_dampers else []),
     ]
 
 

@@ -15,6 +15,7 @@ from sensor.conditions import Condition
 from sensor.estimator import Estimator
 from sensor.estimators import make
 from sensor.metrics import rms
+from sensor.missing import HeldSamples
 from sensor.paper import paper_rows
 
 Array = npt.NDArray[np.float64]
@@ -43,14 +44,19 @@ def compare(
 def estimates_of(
     recorder: Recorder, initial_command: Array, condition: Condition = "ideal"
 ) -> tuple[Array, dict[str, Array], npt.NDArray[np.bool_]]:
-    """Return the truth and each estimator's velocities (rows, 4) [m/s], and the rows that count."""
+    """Return the truth and each estimator's velocities (rows, 4) [m/s], and the rows that count.
+
+    Where a channel is missing in some rows, the baselines bridge that as the sensor does.
+    """
     channels, truth = recorder.group("channels"), recorder.group("truth")
     estimates = {"sensor": recorder.group("estimate")}
     rows = recorder.group("valid")[:, 0] > 0
     if len(channels):
         commands = held(recorder.group("command"), initial_command)
+        gaps = not np.isfinite(channels).all()
         estimates |= {
-            name: b.apply(channels, commands) for name, b in _baselines(condition).items()
+            name: (HeldSamples(b) if gaps else b).apply(channels, commands)
+            for name, b in _baselines(condition).items()
         }
     for estimate in estimates.values():
         rows = rows & np.isfinite(estimate).all(axis=1)

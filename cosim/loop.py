@@ -8,20 +8,22 @@ delay, the same for every vehicle FMU.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.control.sample import Sample
+from cosim.faults.latency import PromptDampers
+from cosim.faults.stack import NoFaults
 from cosim.recorder import Recorder
 from cosim.vehicle import State
 
 Array = npt.NDArray[np.float64]
 
 PROGRESS_STEPS = 50
-NOTHING = np.zeros(0)  # recorded in the place of ideal channels that are the measured ones
+NOTHING = np.zeros(0)  # recorded in the place of what is the same as another group
 
 
 class VehicleBlock(Protocol):
@@ -55,6 +57,19 @@ class MeasurementBlock(Protocol):
         """
 
 
+class FaultBlock(Protocol):
+    """Does to the measured channels what happens to them on the way to the sensor; `bridged` (14,)
+    are the channels of the last sample with the last value where one is missing.
+    """
+
+    bridged: Array
+
+    def step(self, k: int, measured: Array) -> Array:
+        """Take the channels (14,) of sample k as measured; return them as the sensor gets them, NaN
+        where one is missing, `measured` itself where nothing ever happens to them.
+        """
+
+
 class SensorBlock(Protocol):
     """Estimates the suspension velocities; `deviation` (4,) [m/s] is the standard deviation that it
     expects of its error, NaN if it expects none.
@@ -78,15 +93,26 @@ class ControllerBlock(Protocol):
         """Return the damper commands (4,), 0 soft to 1 hard, from what is known at t_k."""
 
 
+class DamperBlock(Protocol):
+    """Brings the command to the dampers."""
+
+    def step(self, command: Array) -> Array:
+        """Take the command (4,) given now; return the one that the dampers hold from now on, which
+        is `command` itself where it is never late.
+        """
+
+
 @dataclass(frozen=True)
 class Blocks:
-    """The four roles, and the measurement between vehicle and sensor."""
+    """The four roles; measurement and faults between vehicle and sensor; the way to the dampers."""
 
     vehicle: VehicleBlock
     driver: DriverBlock
     measurement: MeasurementBlock
     sensor: SensorBlock
     controller: ControllerBlock
+    faults: FaultBlock = field(default_factory=NoFaults)
+    dampers: DamperBlock = field(default_factory=PromptDampers)
 
 
 def run(
@@ -101,24 +127,27 @@ def run(
     """
     vehicle, driver, measurement = blocks.vehicle, blocks.driver, blocks.measurement
     sensor, controller = blocks.sensor, blocks.controller
+    faults, dampers = blocks.faults, blocks.dampers
     command = controller.command  # the vehicle stands at t_0 with the initial one
     sample = Sample()
     for k in range(steps + 1):
         state = vehicle.read()  # vehicle -> outputs at t_k
         vehicle.check_finite(k)
         measured = measurement.step(state.channels, state.stage)  # outputs -> channels of a car
-        valid = sensor.step(measured, command)  # channels -> estimates, or invalid
-        sample.renewed(measured, sensor.estimate, sensor.deviation, valid, state.truth)
+        given = faults.step(k, measured)  # channels of a car -> what arrives of them
+        valid = sensor.step(given, command)  # channels -> estimates, or invalid
+        sample.renewed(faults.bridged, sensor.estimate, sensor.deviation, valid, state.truth)
         command = controller.step(sample)  # what is known -> damper commands
+        held = dampers.step(command)  # command -> what the dampers hold
         pedals = driver.step(k, state)
-        ideal = NOTHING if measured is state.channels else state.channels
         recorder.append(
-            k, measured, sensor.estimate, sensor.deviation, valid, state.truth,
-            command, pedals, state.recorded, ideal,
+            k, given, sensor.estimate, sensor.deviation, valid, state.truth, command, pedals,
+            state.recorded, NOTHING if measured is state.channels else state.channels,
+            NOTHING if given is measured else measured, NOTHING if held is command else held,
         )  # fmt: skip
         if progress is not None and k % PROGRESS_STEPS == 0:
             progress(k, steps)
         if k == steps or driver.finished:
             break
-        vehicle.step(k, pedals, command)  # hold both over [t_k, t_k+1]
+        vehicle.step(k, pedals, held)  # hold both over [t_k, t_k+1]
     return k

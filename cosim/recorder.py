@@ -102,6 +102,15 @@ class Recorder:
         known = [signal.name for signal in self.signals]
         return self._data[: self._rows, [known.index(name) for name in names]]
 
+    def car_channels(self, names: Sequence[str]) -> Array:
+        """Return the filled rows of channels as the car had them, (rows, len(names)): exact where
+        that was recorded, else as measured, before any fault.
+        """
+        known = {signal.name for signal in self.signals}
+        before = ("Ideal.", "Measured.", "")
+        found = [next(f"{b}{n}" for b in before if f"{b}{n}" in known or not b) for n in names]
+        return self.columns(found)
+
     def signals_of(self, name: str) -> tuple[Signal, ...]:
         """Return the signals of a group."""
         return self.signals[self._slices[name]]

@@ -311,7 +311,7 @@ def test_the_record_names_every_column_once_with_its_unit() -> None:
     assert len(set(names)) == len(names)
     assert [name for name, _ in record_groups()] == [
         "channels", "estimate", "deviation", "valid", "truth", "command", "driver", "vehicle",
-        "ideal",
+        "ideal", "measured", "held",
     ]  # fmt: skip
     assert {s.name: s.header for s in signals}["Car.CFL.q0"] == "Car.CFL.q0 [m]"
     assert {s.name: s.header for s in signals}["DM.Gas"] == "DM.Gas"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from cosim.cli import main
 from cosim.control.sample import Sample
 from cosim.control.switching import SwitchingDampers
 from cosim.errors import FmuError
+from cosim.faults.latency import LateDampers
 from cosim.loop import Blocks, ControllerBlock, MeasurementBlock, SensorBlock
 from cosim.loop import run as run_loop
 from cosim.recorder import Recorder, Signal, held
@@ -135,11 +137,12 @@ class _CountingDriver:
 GROUPS = {
     "channels": 14, "estimate": 4, "deviation": 4, "valid": 1, "truth": 4, "command": 4,
     "driver": 3, "vehicle": 14, "ideal": 0,
+    "measured": 0, "held": 0,
 }  # fmt: skip
 
 
-def recorder(rows: int, ideal: int = 0) -> Recorder:
-    widths = {**GROUPS, "ideal": ideal}
+def recorder(rows: int, **other: int) -> Recorder:
+    widths = {**GROUPS, **other}
     return Recorder(
         [(name, [Signal(f"{name}{i}", "") for i in range(n)]) for name, n in widths.items()], rows
     )
@@ -168,6 +171,53 @@ def test_what_is_measured_goes_to_sensor_controller_and_record() -> None:
     np.testing.assert_array_equal(record.group("command")[:, 0], 200.5 + k)
     np.testing.assert_array_equal(record.group("ideal")[:, 13], k)
     np.testing.assert_array_equal(record.group("truth")[:, 0], -k)
+
+
+class Shifted:
+    """A fault that adds 0.25 to every channel; for the controller it is 0.125."""
+
+    def __init__(self) -> None:
+        self.bridged: Array = np.zeros(14)
+
+    def step(self, k: int, measured: Array) -> Array:
+        assert measured[0] == k + 0.5
+        self.bridged = measured + 0.125
+        return measured + 0.25
+
+
+def test_a_fault_stands_between_measurement_and_sensor() -> None:
+    """The sensor gets the faulty channels, the controller those without gaps; both are kept."""
+    counter, record = Counter(error=0.5), recorder(6, ideal=14, measured=14)
+    blocks = replace(counter.blocks(), faults=Shifted(), controller=Hearing())
+    run_loop(blocks, record, 5)
+    k = np.arange(6.0)
+    np.testing.assert_array_equal(record.group("ideal")[:, 13], k)
+    np.testing.assert_array_equal(record.group("measured")[:, 13], k + 0.5)
+    np.testing.assert_array_equal(record.group("channels")[:, 13], k + 0.75)
+    np.testing.assert_array_equal(record.group("estimate")[:, 0], 100.75 + k)
+    np.testing.assert_array_equal(record.group("command")[:, 0], k + 0.625)
+
+
+class Hearing:
+    """A controller whose command is the channels that it gets."""
+
+    def __init__(self) -> None:
+        self.command: Array = np.full(4, 199.0)
+
+    def step(self, sample: Sample) -> Array:
+        return sample.measured[:4].copy()
+
+
+def test_a_late_command_acts_samples_later_and_is_kept_beside_the_one_given() -> None:
+    counter, record = Counter(), recorder(6, held=4)
+    blocks = replace(counter.blocks(), dampers=LateDampers(2, np.full(4, 199.0)))
+    run_loop(blocks, record, 5)
+    held = [199.0, 199.0, 200.0, 201.0, 202.0, 203.0]
+    np.testing.assert_array_equal(record.group("held")[:, 0], held)
+    np.testing.assert_array_equal(record.group("command")[:, 0], 200 + np.arange(6.0))
+    assert [damper for _, damper in counter.held] == held[:5]
+    # the sensor's control unit knows what it sent, not what arrived
+    assert counter.told == [199.0, *(200.0 + k for k in range(5))]
 
 
 def test_commands_of_row_k_are_held_from_k_on() -> None:

@@ -13,10 +13,10 @@ Array = npt.NDArray[np.float64]
 class Sample:
     """What is known at t_k; the loop makes one object and renews it at every sample.
 
-    `measured` (14,) the channels as measured, SI units; `estimate` (4,) the suspension velocities
-    [m/s], positive in extension, order FL FR RL RR, and `deviation` (4,) [m/s] the standard
-    deviation that the sensor expects of their errors, NaN if it expects none; `valid` whether the
-    estimate counts; `truth` (4,) [m/s] the true velocities, for controllers that a scenario allows
+    `measured` (14,) the channels as they arrive, SI units, the last value where one is missing;
+    `estimate` (4,) the suspension velocities [m/s], positive in extension, order FL FR RL RR, and
+    `deviation` (4,) [m/s] the standard deviation that the sensor expects of their errors, NaN if it
+    expects none; `valid` whether the estimate counts; `truth` (4,) [m/s] the true velocities, for controllers that a scenario allows
     to read them (`feedback: truth`) and for no other. The arrays are the blocks' own: not to be
     written to, and other values at the next sample.
     """

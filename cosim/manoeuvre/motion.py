@@ -46,11 +46,7 @@ class Motion:
 
 
 def motion_of(recorder: Recorder) -> Motion:
-    """Return the true motion of a record with the groups channels and vehicle, and with the group
-    ideal where the channels are measured with errors.
-    """
-    pose = ("Car.tx", "Car.ty", "Car.Yaw")
-    channels: tuple[str, ...] = ("Car.vx", "Car.ay", "Car.YawRate", "Steer.WhlAng")
-    recorded = {signal.name for signal in recorder.signals}
-    channels = tuple(f"Ideal.{n}" if f"Ideal.{n}" in recorded else n for n in channels)
-    return Motion(recorder.time, *recorder.columns((*pose, *channels)).T)
+    """Return the true motion of a record with the groups channels and vehicle."""
+    pose = recorder.columns(("Car.tx", "Car.ty", "Car.Yaw"))
+    channels = recorder.car_channels(("Car.vx", "Car.ay", "Car.YawRate", "Steer.WhlAng"))
+    return Motion(recorder.time, *pose.T, *channels.T)

@@ -113,7 +113,7 @@ def _speed(recorder: Recorder) -> str | None:
     names = [signal.name for signal in recorder.signals_of("channels")]
     if "Car.vx" not in names:
         return None
-    return _base64(recorder.group("channels")[:, names.index("Car.vx")] * MS_TO_KMH)
+    return _base64(recorder.car_channels(["Car.vx"])[:, 0] * MS_TO_KMH)
 
 
 def _base64(column: npt.NDArray[np.float64]) -> str:

@@ -22,6 +22,8 @@ from pydantic_core import PydanticCustomError
 from cosim.errors import Place, Problem, did_you_mean
 from cosim.scenario.controllers import Controller, Passive
 from cosim.scenario.driver import Driver
+from cosim.scenario.faults import Fault, labels
+from cosim.scenario.latency import Latency
 from cosim.scenario.limit import Limit
 from cosim.scenario.manoeuvre import Manoeuvre
 from cosim.scenario.model import Model, with_unit
@@ -68,6 +70,10 @@ class Scenario(Model):
     driver: Driver = Driver()
     vehicle: Vehicle = Vehicle()
     sensor: Sensor = Sensor()
+    faults: tuple[Fault, ...] = Field(
+        default=(), strict=False, description="what happens to the channels, in this order"
+    )
+    latency: Latency = Latency()
     controllers: tuple[Controller, ...] = Field(
         default=(Passive(kind="passive"),), strict=False, min_length=1, description="one run each"
     )
@@ -89,6 +95,17 @@ class Scenario(Model):
                 raise PydanticCustomError(
                     "labels", "two runs are called '{label}'; give one a name", {"label": label}
                 )
+        return value
+
+    @field_validator("faults")
+    @classmethod
+    def _faults_differ(cls, value: tuple[Fault, ...]) -> tuple[Fault, ...]:
+        found = labels(value)
+        doubled = next((label for label in found if found.count(label) > 1), None)
+        if doubled is not None:
+            raise PydanticCustomError(
+                "labels", "two faults are called '{label}'; give one a name", {"label": doubled}
+            )
         return value
 
     @model_validator(mode="after")
