@@ -18,6 +18,7 @@ from fmu_face import ROOT, Face, package, toolchain
 from vehicle_rig import cosine_bump, straight_road
 
 H = 0.01
+OWN_ROAD = "road.crg"
 HEADERS = {
     "fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h",
     "fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h",
@@ -85,7 +86,10 @@ def test_roads_and_resources_below_folders_of_any_name(
     with fmus.unzipped(version, f"{odd} ") as folder:
         inside = folder / "resources" / odd
         shutil.copy(absolute, _made(inside) / "Straße é.crg")
-        for road in (absolute, f"{odd}/Straße é.crg", ""):
+        for road in (absolute, f"{odd}/Straße é.crg", "", OWN_ROAD):
+            if road == OWN_ROAD:  # what it takes where nothing is named
+                shutil.copy(absolute, folder / "resources" / OWN_ROAD)
+                road = ""
             face = Face(folder)
             face.enter()
             face["Road.File"], face["Init.x"] = road, 1.0
@@ -93,7 +97,7 @@ def test_roads_and_resources_below_folders_of_any_name(
             heights.append(face["Car.zRoadFL"])
             assert face["Road.File"] == road
             face.free()
-    assert heights[0] == heights[1] > 0.005
+    assert heights[0] == heights[1] == heights[3] > 0.005
     assert heights[2] == 0.0
 
 

@@ -3,6 +3,7 @@
 #include <string.h>
 #include "vehicle.h"
 
+static const char OWN_ROAD[] = "road.crg"; /* in the FMU's resources */
 static const double FULL_SPEEDS[] = {0.05, 0.1, 0.25, 0.5, 1.0, 2.0}; /* m/s, of the damper tables */
 
 static void damper_curves(const Variables *p, Vehicle *c) {
@@ -106,12 +107,19 @@ static ModelStatus check(const Model *m, const Vehicle *c) {
     return MODEL_OK;
 }
 
+/* Without Road.File the road that lies in the FMU's resources, if one was put there; else it is flat. */
+static int own_road(const Model *m, const char *path) {
+    FILE *file = m->resources[0] ? fopen(path, "rb") : NULL;
+    if (file) fclose(file);
+    return file != NULL;
+}
+
 static ModelStatus load_road(const Model *m, Vehicle *c) {
-    const char *file = m->v.Road_File;
-    if (!file[0]) return MODEL_OK;
-    const int absolute = file[0] == '/' || file[0] == '\\' || (file[0] && file[1] == ':');
+    const char *file = m->v.Road_File[0] ? m->v.Road_File : OWN_ROAD;
+    const int absolute = file[0] == '/' || file[0] == '\\' || file[1] == ':';
     char path[2 * MODEL_STRING_SIZE], error[512] = "";
     snprintf(path, sizeof path, "%s%s%s", absolute ? "" : m->resources, absolute ? "" : "/", file);
+    if (!m->v.Road_File[0] && !own_road(m, path)) return MODEL_OK;
     c->road = road_load(path, error, sizeof error);
     if (c->road) return MODEL_OK;
     model_log(m, MODEL_ERROR, "logRoad", "Road.File: %s", error);
