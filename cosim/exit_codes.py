@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final
 
@@ -43,8 +43,12 @@ def failures_as_exit_codes() -> Iterator[None]:
 
 def one_thread() -> None:
     """Let libraries compute in one thread, here and in processes that are started."""
-    for name in ONE_THREAD:
-        os.environ.setdefault(name, "1")
+    os.environ.update(one_threaded(os.environ))
+
+
+def one_threaded(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment in which libraries compute in one thread, unless it says otherwise."""
+    return dict.fromkeys(ONE_THREAD, "1") | dict(environment)
 
 
 def threads_that_sleep() -> None:

@@ -79,7 +79,7 @@ def test_each_ends_in_its_own_way_and_the_worst_decides(batch: Batch) -> None:
 def test_failures_are_said_in_a_sentence(batch: Batch) -> None:
     said = batch.result.stderr
     assert "error: set/more/words.yaml: p.fmu: could not step at t = 0.19 s: the parrot" in said
-    assert "error: set/more/dies.yaml: the process ended without a word" in said
+    assert "error: set/more/dies.yaml: the process of the run crashed (SIGSEGV, memory" in said
     assert "set/recipe.yaml has no road, so it is no scenario; left out" in said
     assert "3 of 5 scenarios FAILED; results in results" in said
     assert "Traceback" not in said

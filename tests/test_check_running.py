@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -14,11 +16,11 @@ from fmu_rebuild import NEEDS_BINUTILS, Functions, rebuilt
 
 from cosim.check import dynamic
 from cosim.check.checker import check
-from cosim.check.child import CheckerError, Children, Failure
 from cosim.check.finding import Report
 from cosim.check.trials.bench import swing
-from cosim.check.trials.job import Answer, Channel
+from cosim.check.trials.job import Channel, Job
 from cosim.check.trials.rules import other_value
+from cosim.isolation import Children, Death, WorkError
 
 pytestmark = NEEDS_BINUTILS
 
@@ -29,14 +31,14 @@ class Shared(Children):
     def __exit__(self, *_: object) -> None:
         """Stay."""
 
-    def again(self, timeout: float) -> Shared:
+    def again(self, timeout: float, modules: tuple[str, ...]) -> Shared:
         self._timeout = timeout
         return self
 
 
 @pytest.fixture(scope="module")
 def shared() -> Iterator[Shared]:
-    children = Shared(20.0)
+    children = Shared(20.0, dynamic.MODULES)
     yield children
     Children.__exit__(children)
 
@@ -306,7 +308,7 @@ def test_a_binary_that_does_not_load_is_not_run(fmus: dict[int, Path], tmp_path:
 def test_systems_without_fork(
     fmus: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(dynamic, "Children", lambda timeout: Children(timeout, forks=False))
+    monkeypatch.setattr(dynamic, "Children", partial(Children, forks=False))
     report = check(fmus[3])
     assert (report.findings, len(report.trials)) == ([], len(dynamic.TRIALS))
     path = rebuilt(fmus[2], tmp_path, ABORT)
@@ -318,10 +320,10 @@ def test_systems_without_fork(
 def test_a_mistake_of_the_checker_is_no_finding(
     fmus: dict[int, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Children, "run", lambda self, job: Answer(broken="ZeroDivisionError"))
-    with pytest.raises(CheckerError, match="ZeroDivisionError"):
+    monkeypatch.setattr(dynamic, "perform", math.sqrt)  # of no number
+    with pytest.raises(WorkError, match=r"sqrt is at fault:(.|\n)*TypeError"):
         check(fmus[2])
-    assert CheckerError.exit_code == 3
+    assert WorkError.exit_code == 3
 
 
 def test_an_fmu_that_fails_only_once_in_a_while_keeps_its_reference(
@@ -330,11 +332,13 @@ def test_an_fmu_that_fails_only_once_in_a_while_keeps_its_reference(
     """A failure in one trial says what the FMU was doing."""
     run = Children.run
 
-    def fail(self: Children, job: object) -> object:
-        return Failure("crash", "it crashed") if job.trial == "token" else run(self, job)
+    def fail(self: Children, work: object, job: Job) -> object:
+        if job.trial == "token":
+            return Death("crash", "SIGILL", "fmi3Instantiate")
+        return run(self, work, job)
 
     monkeypatch.setattr(Children, "run", fail)
-    alone(check(fmus[3]), "crash", "it crashed, when a wrong token is offered")
+    alone(check(fmus[3]), "crash", "SIGILL", "fmi3Instantiate, when a wrong token is offered")
 
 
 @pytest.mark.parametrize(
@@ -375,7 +379,7 @@ def test_a_process_that_does_not_start_is_no_finding(
 ) -> None:
     monkeypatch.setattr(dynamic, "Children", Children)
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    with pytest.raises(CheckerError, match="did not start"):
+    with pytest.raises(WorkError, match="did not start"):
         check(fmus[2])
 
 
@@ -392,7 +396,8 @@ def test_an_interrupted_check_leaves_no_process(
         if file.is_file() and file.read_text():
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("cosim.check.child.read_journal", lambda _: interrupt() or (0, "", ""))
+    read = "cosim.isolation.children.read_journal"
+    monkeypatch.setattr(read, lambda _: interrupt() or (0, "", ""))
     with pytest.raises(KeyboardInterrupt):
         check(path)
     process = Path("/proc") / file.read_text()

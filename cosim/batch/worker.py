@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import signal
 from collections.abc import Callable
 from functools import partial
-from types import FrameType
 from typing import TypeVar
 
 from cosim.batch.job import Ended, Job
 from cosim.errors import CosimError, explained
+from cosim.isolation import Journal
 
 E = TypeVar("E")
-_busy = False
 
 
-def start() -> None:
-    """Prepare the process: an interrupt ends a run as it does in a single one, idle processes go
-    without a word.
-    """
-    signal.signal(signal.SIGINT, _interrupted)
-
-
-def check(job: Job) -> Ended:
+def check(job: Job, journal: Journal) -> Ended:
     """Look for all that can be wrong with a scenario before its first step; build its road."""
 
     def look() -> Ended:
@@ -34,10 +24,11 @@ def check(job: Job) -> Ended:
         longest = check_scenario(scenario)
         return Ended(job, longest_s=longest * len(scenario.controllers))
 
+    journal.call("the check of the scenario")
     return guarded(look, partial(Ended, job))
 
 
-def drive(job: Job) -> Ended:
+def drive(job: Job, journal: Journal) -> Ended:
     """Run a scenario and write its results."""
 
     def run() -> Ended:
@@ -48,6 +39,7 @@ def drive(job: Job) -> Ended:
         outcome = execute(scenario, job.output_dir, command=job.command)
         return Ended(job, outcome.exit_code, (), outcome.metrics, outcome.notes)
 
+    journal.call("the run")
     return guarded(run, partial(Ended, job))
 
 
@@ -55,17 +47,7 @@ def guarded(work: Callable[[], E], failed: Callable[[int, tuple[str, ...]], E]) 
     """Return what `work` does, or what went wrong as a result, from its exit code and sentences:
     other jobs go on.
     """
-    global _busy
-    _busy = True
     try:
         return work()
     except (CosimError, OSError) as error:
         return failed(*explained(error))
-    finally:
-        _busy = False
-
-
-def _interrupted(_number: int, _frame: FrameType | None) -> None:
-    if _busy:
-        raise KeyboardInterrupt
-    os._exit(130)

@@ -23,7 +23,7 @@ def check(path: Path, static: bool = False, timeout: float = 20.0) -> Report:
     """Return all that is wrong with an FMU; with `static` it is only read, not run.
 
     `timeout` is how long one call of the FMU may take [s]. Raises `InputError` if the file is no
-    readable archive, or of another FMI version than 2.0, 3.0, and `CheckerError` if the checker
+    readable archive, or of another FMI version than 2.0, 3.0, and `WorkError` if the checker
     itself is at fault.
     """
     report = Report(path)

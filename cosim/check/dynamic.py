@@ -14,12 +14,13 @@ from typing import Any, Final
 
 from cosim.check.archive import Archive
 from cosim.check.binaries import binary_for
-from cosim.check.child import CheckerError, Children, Failure
 from cosim.check.description import Description
 from cosim.check.finding import Finding, Report
 from cosim.check.parts import Variable, number, whole
 from cosim.check.schema import fmpy_folder
 from cosim.check.trials.job import Answer, Channel, Job
+from cosim.check.trials.perform import perform
+from cosim.isolation import Children, Death
 
 ODD_FOLDER: Final = "a b Prüfstand 道路"
 STEPS: Final = 200  # of the default experiment where the XML gives no step size
@@ -43,13 +44,14 @@ TRIALS: Final = {
 }
 COMPARED: Final = ("again", "thread", "reset", "instances", "state", "serialised")
 _STATES: Final = {"state-not-restored", "state-call-failed"}
+MODULES: Final = ("cosim.check.trials.perform",)
 _UNFIT: Final = {"binary-format", "binary-architecture", "no-binary-here", "model-identifier"}
 
 
 def run_trials(archive: Archive, description: Description, report: Report, timeout: float) -> None:
     """Run every trial and add what it finds. `timeout` is how long one call may take [s].
 
-    Raises `CheckerError` if a trial itself is at fault.
+    Raises `WorkError` if a trial itself is at fault.
     """
     unfit = _UNFIT & set(report.codes)
     library = binary_for(archive, description.identifier, description.major)
@@ -66,7 +68,7 @@ def run_trials(archive: Archive, description: Description, report: Report, timeo
             return
         (folder / "resources").mkdir(exist_ok=True)
         job = job_of(description, folder, folder / library, Path(name).resolve())
-        with Children(timeout) as children:
+        with Children(timeout, MODULES) as children:
             _Trials(job, report, children, archive.read(library)).run()
 
 
@@ -105,14 +107,12 @@ class _Trials:
 
     def _trial(self, trial: str, quiet: bool = False) -> bool:
         """Run one trial, add its findings; return whether the rest makes no sense."""
-        answer = self.children.run(replace(self.job, trial=trial))
-        if isinstance(answer, Failure):
+        answer = self.children.run(perform, replace(self.job, trial=trial))
+        if isinstance(answer, Death):
             if not quiet:
-                words = f"{answer.words}, {TRIALS[trial]}"
-                self.report.add([Finding(answer.code, f"trial {trial}", words)])
+                words = f"{_words(answer)}, {TRIALS[trial]}"
+                self.report.add([Finding(answer.kind, f"trial {trial}", words)])
             return True
-        if answer.broken:
-            raise CheckerError(f"trial '{trial}' is at fault:\n{answer.broken}")
         self.report.trials.append(trial)
         self.report.not_judged += [n for n in answer.notes if n not in self.report.not_judged]
         self.report.add(self._findings(answer))
@@ -138,6 +138,12 @@ class _Trials:
             if (finding.code, finding.where) not in known:
                 known.add((finding.code, finding.where))
                 yield finding
+
+
+def _words(death: Death) -> str:
+    if death.kind == "hang":
+        return f"{death.call} did not return within {death.timeout:g} s{death.said}"
+    return f"it {death.manner} in {death.call}{death.said}"
 
 
 # ---------------------------------------------------------------- the job
@@ -173,8 +179,6 @@ def job_of(description: Description, folder: Path, library: Path, files: Path) -
         stop=stop,
         step=step,
         internal_step=internal,
-        journal=str(files / "journal"),
-        answer=str(files / "answer.json"),
         reference=str(files / "reference.json"),
         logger=_logger(),
     )

@@ -8,9 +8,10 @@ from functools import partial
 from pathlib import Path
 
 from cosim.batch import worker
-from cosim.batch.pool import DIED, Task, pool_of, through
+from cosim.batch.pool import Pool, Task, sentence
 from cosim.dataset.drive import drive, is_there
 from cosim.dataset.plan import PlannedRun
+from cosim.isolation import Journal
 
 
 @dataclass(frozen=True)
@@ -36,21 +37,22 @@ def build(
     processes: int,
     tell: Callable[[Driven], None] = lambda driven: None,
 ) -> list[Driven]:
-    """Drive `runs` in spawned processes, one FMU each, and return how each ended, in their order.
+    """Drive `runs` in processes of their own and return how each ended, in their order.
 
     A run that fails does not stop the others; `tell` hears of each that has ended.
     """
     if not runs:
         return []
     directory.mkdir(parents=True, exist_ok=True)
-    task = Task(partial(_work, directory), lambda run: Driven(run, 3, (DIED,)))
-    with pool_of(min(processes, len(runs))) as pool:
-        ended = through(pool, task, runs, tell)
+    task = Task(partial(_work, directory), lambda run, death: Driven(run, 3, (sentence(death),)))
+    with Pool(min(processes, len(runs))) as pool:
+        ended = pool.through(task, runs, tell)
     return [ended[run] for run in runs]
 
 
-def _work(directory: Path, run: PlannedRun) -> Driven:
+def _work(directory: Path, run: PlannedRun, journal: Journal) -> Driven:
     """What a process does with a run."""
+    journal.call("the run")
     return worker.guarded(
         lambda: Driven(run, simulated_s=drive(run, directory)), partial(Driven, run)
     )

@@ -12,6 +12,7 @@ from typing import Any, Final
 from cosim.check.trials.instance import Instance
 from cosim.check.trials.job import Answer, Channel, Job
 from cosim.check.trials.library import Library
+from cosim.isolation.journal import Journal
 
 Row = list[Any]
 ROWS: Final = 40  # steps of the run that others are compared with
@@ -58,9 +59,9 @@ class Watch:
 class Bench:
     """A library under trial and the experiment it is tried in."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, journal: Journal) -> None:
         self.job = job
-        self.library = Library(job)
+        self.library = Library(job, journal)
         usable = [c for c in job.channels if c.type not in _SETTABLE]
         self.inputs = [c for c in usable if c.causality == "input"]
         outputs = [c for c in usable if c.causality == "output"]

@@ -1,10 +1,8 @@
-"""What a trial is told and what it answers, as JSON."""
+"""What a trial is told and what it answers."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -48,16 +46,10 @@ class Job:
     stop: float
     step: float
     internal_step: float | None
-    journal: str
-    answer: str
     reference: str
     logger: str = ""
     moving: bool = True
     budget: float = 2.0
-
-    def write(self, path: Path) -> None:
-        """Write the job for the child process."""
-        path.write_text(json.dumps(asdict(self)), encoding="utf-8")
 
 
 @dataclass
@@ -67,30 +59,7 @@ class Answer:
     findings: list[tuple[str, str, str]] = field(default_factory=list)
     fatal: bool = False
     notes: list[str] = field(default_factory=list)
-    broken: str = ""  # the traceback of a mistake of the trial itself
 
     def add(self, code: str, where: str, message: str) -> None:
         """Add a finding."""
         self.findings.append((code, where, message))
-
-    def write(self, path: Path) -> None:
-        """Write the answer for the parent process."""
-        path.write_text(json.dumps(asdict(self)), encoding="utf-8")
-
-
-def read_job(path: Path) -> Job:
-    """Read what the parent wrote."""
-    raw = json.loads(path.read_text(encoding="utf-8"))
-    channels = tuple(Channel(**channel) for channel in raw.pop("channels"))
-    for name in ("categories", "flags"):
-        raw[name] = tuple(raw[name])
-    return Job(channels=channels, **raw)
-
-
-def read_answer(path: Path) -> Answer | None:
-    """Read what the child wrote; None if it wrote nothing."""
-    if not path.is_file():
-        return None
-    raw = json.loads(path.read_text(encoding="utf-8"))
-    raw["findings"] = [tuple(finding) for finding in raw["findings"]]
-    return Answer(**raw)

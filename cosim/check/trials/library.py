@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from cosim.check.trials.job import Channel, Job
-from cosim.check.trials.journal import Journal
+from cosim.isolation.journal import Journal
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 STATUS: Final = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
@@ -60,9 +60,8 @@ def status_name(status: int) -> str:
 class Library:
     """A loaded shared library. Raises `OSError` with the loader's words."""
 
-    def __init__(self, job: Job) -> None:
-        self.job, self.major = job, job.major
-        self.journal = Journal(Path(job.journal))
+    def __init__(self, job: Job, journal: Journal) -> None:
+        self.job, self.major, self.journal = job, job.major, journal
         self.messages: list[tuple[int, str, str]] = []
         self.categories: set[str] = set()
         self.journal.call("the loading of the library")

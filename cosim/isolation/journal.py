@@ -1,4 +1,4 @@
-"""A note of the call under way, in a file both processes map: it survives a crash and a kill."""
+"""A note of what is under way, in a file both processes map: it survives a crash and a kill."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import struct
 from pathlib import Path
 from typing import Final
 
+FILE: Final = "journal"
 SIZE: Final = 2048
 _HALF: Final = 1024
 _HEAD: Final = struct.Struct("<QI")
 
 
 class Journal:
-    """Writes the number of calls made, the call under way, and the FMU's last message."""
+    """Writes the number of calls made, the call under way, and the last message."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("r+b")
@@ -26,7 +27,7 @@ class Journal:
         self._write(0, text)
 
     def message(self, text: str) -> None:
-        """Note what the FMU has just said."""
+        """Note what has just been said, such as by an FMU."""
         self._write(_HALF, text)
 
     def _write(self, start: int, text: str) -> None:
@@ -42,7 +43,7 @@ def new_journal(path: Path) -> None:
 
 
 def read_journal(path: Path) -> tuple[int, str, str]:
-    """Return the number of calls, the call under way and the FMU's last message."""
+    """Return the number of calls, the call under way and the last message."""
     content = path.read_bytes()
     texts = []
     for start in (0, _HALF):

@@ -1,0 +1,11 @@
+"""Work in processes of its own: sent out, watched, and brought home or buried.
+
+A crash or a hang of an FMU takes down the one process that runs it; what it was doing is known from
+a journal that outlives it. Nothing heavy is imported here.
+"""
+
+from cosim.isolation.children import Children, WorkError
+from cosim.isolation.death import Death
+from cosim.isolation.journal import Journal
+
+__all__ = ["Children", "Death", "Journal", "WorkError"]
