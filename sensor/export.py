@@ -21,9 +21,14 @@ from onnx import TensorProto, helper, numpy_helper
 from sensor.channels import CHANNEL_NAMES, CHANNEL_UNITS, OUTPUT_NAMES, OUTPUT_UNITS, SAMPLE_RATE_HZ
 from sensor.errors import SensorError
 from sensor.features import WHEEL_SPEEDS
+from sensor.metadata import METADATA_KEY
 from sensor.network import TAP, BiLstmNetwork
-from sensor.residual_matrices import ResidualMatrices
-from sensor.runtime import METADATA_KEY
+from sensor.operation import Operation
+from sensor.residual_matrices import (
+    ResidualMatrices,
+    residual_constants,
+    residual_operations,
+)
 
 OPSET = 17
 IR_VERSION = 8
@@ -60,7 +65,7 @@ def build_windowed(
     """Build the windowed graph with explicit normalisation nodes and metadata."""
     config = network.config
     nodes = [
-        *(_residuals() if config.residual else []),
+        *([node_of(o) for o in residual_operations()] if config.residual else []),
         helper.make_node(
             "Sub", ["seen" if config.residual else "measured", "input_mean"], ["centred"]
         ),
@@ -108,31 +113,11 @@ def build_windowed(
     return model
 
 
-def _residuals() -> list[onnx.NodeProto]:
-    """Replace the wheel speeds by their residuals, see `sensor.residual_matrices`."""
-    return [
-        helper.make_node("Cast", ["measured"], ["sample"], to=TensorProto.DOUBLE),
-        helper.make_node("MatMul", ["sample", "wheels"], ["wheel_speed"]),
-        helper.make_node("MatMul", ["sample", "driving"], ["driving_speed"]),
-        helper.make_node("MatMul", ["sample", "steering"], ["steer_angle"]),
-        helper.make_node("MatMul", ["sample", "slip"], ["driving_slip"]),
-        helper.make_node("Cos", ["steer_angle"], ["steer_cosine"]),
-        helper.make_node("Div", ["driving_speed", "steer_cosine"], ["rolling_speed"]),
-        helper.make_node("Add", ["driving_slip", "rolling"], ["wheel_per_rolling"]),
-        helper.make_node("Mul", ["rolling_speed", "wheel_per_rolling"], ["driven_speed"]),
-        helper.make_node("Sub", ["wheel_speed", "driven_speed"], ["unbounded_residual"]),
-        helper.make_node("Clip", ["unbounded_residual", "lowest", "highest"], ["residual"]),
-        helper.make_node("MatMul", ["residual", "spread"], ["residual_in_place"]),
-        helper.make_node("Mul", ["sample", "others"], ["other_channels"]),
-        helper.make_node("Add", ["other_channels", "residual_in_place"], ["features_seen"]),
-        helper.make_node("Cast", ["features_seen"], ["seen"], to=TensorProto.FLOAT),
-    ]
-
-
-def _residual_constants() -> dict[str, npt.NDArray[Any]]:
-    matrices = vars(ResidualMatrices.of())
-    limit = np.array(matrices.pop("limit"))
-    return matrices | {"lowest": -limit, "highest": limit}
+def node_of(operation: Operation) -> onnx.NodeProto:
+    """Return the ONNX node of an operation."""
+    return helper.make_node(
+        operation.kind, operation.inputs, operation.outputs, **operation.attributes
+    )
 
 
 def _cell() -> list[onnx.NodeProto]:
@@ -169,7 +154,7 @@ def _weights(network: BiLstmNetwork) -> list[onnx.TensorProto]:
         name: state[name] for name in ("input_mean", "input_std", "output_mean", "output_std")
     }
     if network.config.residual:
-        arrays |= _residual_constants()
+        arrays |= residual_constants()
     return [
         numpy_helper.from_array(np.asarray(array, order="C"), name)
         for name, array in arrays.items()

@@ -9,6 +9,7 @@ In double precision: 30 m/s of driving are taken from a speed that is 30 m/s and
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from sensor.body_motion import Geometry
 from sensor.channels import CHANNEL_NAMES
 from sensor.features import WHEEL_SPEEDS, Slip
+from sensor.operation import DOUBLE, FLOAT, Operation, operation
 
 Array = npt.NDArray[np.float64]
 
@@ -65,3 +67,33 @@ def _columns(rows: dict[str, Array]) -> Array:
     for name, row in rows.items():
         matrix[CHANNEL_NAMES.index(name)] = row
     return matrix
+
+
+def residual_operations() -> list[Operation]:
+    """Return the operations of an ONNX graph from `measured` to `seen`, (batch, W, 14) both, the
+    wheel speeds replaced by their residuals.
+    """
+    return [
+        operation("Cast", "measured", "sample", to=DOUBLE),
+        operation("MatMul", "sample wheels", "wheel_speed"),
+        operation("MatMul", "sample driving", "driving_speed"),
+        operation("MatMul", "sample steering", "steer_angle"),
+        operation("MatMul", "sample slip", "driving_slip"),
+        operation("Cos", "steer_angle", "steer_cosine"),
+        operation("Div", "driving_speed steer_cosine", "rolling_speed"),
+        operation("Add", "driving_slip rolling", "wheel_per_rolling"),
+        operation("Mul", "rolling_speed wheel_per_rolling", "driven_speed"),
+        operation("Sub", "wheel_speed driven_speed", "unbounded_residual"),
+        operation("Clip", "unbounded_residual lowest highest", "residual"),
+        operation("MatMul", "residual spread", "residual_in_place"),
+        operation("Mul", "sample others", "other_channels"),
+        operation("Add", "other_channels residual_in_place", "features_seen"),
+        operation("Cast", "features_seen", "seen", to=FLOAT),
+    ]
+
+
+def residual_constants() -> dict[str, npt.NDArray[Any]]:
+    """Return the constants of these operations, by name."""
+    matrices = vars(ResidualMatrices.of()).copy()
+    limit = np.array(matrices.pop("limit"))
+    return matrices | {"lowest": -limit, "highest": limit}

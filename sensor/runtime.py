@@ -2,36 +2,20 @@
 thread.
 """
 
-import json
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 import onnxruntime as ort
 
-from sensor.channels import CHANNELS, OUTPUTS, SAMPLE_RATE_HZ, check_channels
+from sensor.channels import CHANNELS, OUTPUTS
 from sensor.errors import SensorError
+from sensor.metadata import METADATA_KEY, ModelInfo, read_metadata
 from sensor.window import Window
 
 __all__ = ["ModelInfo", "OnnxSensor", "SensorError"]
 
-METADATA_KEY = "sensor"
-CARRIED = "carried"
 BATCH = 1024
-
-
-@dataclass(frozen=True)
-class ModelInfo:
-    """What a network file says of itself: its kind, window [samples] (1 for carried state), sample
-    rate [Hz], all metadata.
-    """
-
-    kind: Literal["windowed", "carried"]
-    window: int
-    sample_rate_hz: float
-    metadata: dict[str, Any]
 
 
 class OnnxSensor:
@@ -121,28 +105,7 @@ def read_info(session: ort.InferenceSession, source: str) -> ModelInfo:
     """Read and check a network's metadata; raises SensorError naming everything that differs from
     this sensor's channels.
     """
-    text = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
-    if text is None:
-        raise SensorError(
-            f"{source}: its metadata has no entry {METADATA_KEY!r}; its channels are unknown."
-        )
-    try:
-        metadata = json.loads(text)
-        inputs, outputs = metadata["inputs"], metadata["outputs"]
-        rate = float(metadata["sample_rate_hz"])
-        carried = metadata.get("kind") == CARRIED
-        window = 1 if carried else int(metadata["window"])
-        info = ModelInfo("carried" if carried else "windowed", window, rate, metadata)
-        named = [(part["names"], part["units"]) for part in (inputs, outputs)]
-    except (ValueError, KeyError, TypeError) as error:
-        raise SensorError(f"{source}: its metadata lacks or misspells {error}.") from error
-    check_channels(f"{source}, inputs", *named[0], CHANNELS)
-    check_channels(f"{source}, outputs", *named[1], OUTPUTS)
-    if info.sample_rate_hz != SAMPLE_RATE_HZ:
-        raise SensorError(
-            f"{source}: it expects {info.sample_rate_hz:g} Hz, where {SAMPLE_RATE_HZ} Hz belongs."
-        )
-    return info
+    return read_metadata(session.get_modelmeta().custom_metadata_map.get(METADATA_KEY), source)
 
 
 def _check_window(session: ort.InferenceSession, info: ModelInfo, source: str) -> None:

@@ -20,8 +20,8 @@ from cosim.errors import InputError
 from cosim.inspect.command import ROWS, inspect
 from cosim.inspect.facts import size_of
 from cosim.inspect.kind import recognise
-from cosim.inspect.onnx_file import OnnxError, read_onnx
 from sensor.channels import CHANNEL_NAMES
+from sensor.packed.onnx_file import OnnxError, read_onnx
 
 NETWORK = ROOT / "sensor" / "models" / "bilstm_w19_ideal.onnx"
 VEHICLE = ROOT / "cosim" / "fmus" / "vehicle.fmi3.fmu"

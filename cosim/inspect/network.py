@@ -9,9 +9,9 @@ from typing import Any
 
 from cosim.errors import InputError
 from cosim.inspect.facts import Facts, number, size_of
-from cosim.inspect.onnx_file import Model, OnnxError, Port, read_onnx
 from sensor.channels import CHANNELS, OUTPUTS, SAMPLE_RATE_HZ, check_channels
 from sensor.errors import SensorError
+from sensor.packed.onnx_file import Model, OnnxError, Port, read_onnx
 
 METADATA_KEY = "sensor"  # as sensor/runtime.py, which would load ONNX Runtime, has it
 

@@ -16,8 +16,8 @@ from markdown_tables import fill, millimetres, percent, table
 from sensor.conditions import CONDITIONS
 from sensor.errors import SensorError
 from sensor.estimators import model_file
+from sensor.metadata import METADATA_KEY
 from sensor.paper import paper_rows
-from sensor.runtime import METADATA_KEY
 
 _FORMS = {
     True: (

@@ -25,19 +25,9 @@ import numpy.typing as npt
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from sensor.body_motion import Geometry
-from sensor.carried.features import (
-    DELAYED,
-    INTEGRALS,
-    LINE,
-    MEANS,
-    STEER,
-    FeatureConfig,
-    features,
-    scales,
-)
+from sensor.carried.features import INTEGRALS, LINE, MEANS, STEER, features
 from sensor.carried.network import SCALE, CarriedNetwork
-from sensor.carried.nodes import nodes
+from sensor.carried.operations import Arrays, feature_constants, operations
 from sensor.carried.runtime import STATES, CarriedSensor
 from sensor.channels import (
     CHANNEL_NAMES,
@@ -47,14 +37,12 @@ from sensor.channels import (
     SAMPLE_RATE_HZ,
 )
 from sensor.errors import SensorError
-from sensor.export import IR_VERSION, OPSET
-from sensor.features import WHEEL_SPEEDS, Slip
-from sensor.runtime import CARRIED, METADATA_KEY
+from sensor.export import IR_VERSION, OPSET, node_of
+from sensor.features import WHEEL_SPEEDS
+from sensor.metadata import CARRIED, METADATA_KEY
 
 TOLERANCE = 1e-5  # m/s
 _TORCH_TO_ONNX_GATES = [0, 3, 1, 2]  # input, forget, cell, output -> input, output, forget, cell
-
-Arrays = dict[str, npt.NDArray[Any]]
 
 
 def export_carried(
@@ -91,9 +79,10 @@ def build(network: CarriedNetwork, training: Mapping[str, Any]) -> onnx.ModelPro
     inputs += [value(name, shapes[name]) for name in STATES]
     outputs = [value("estimate", [1, 4]), value("deviation", [1, 4])]
     outputs += [value(f"next_{name}", shapes[name]) for name in STATES]
-    arrays = {**_feature_constants(c), **_weights(network)}
+    arrays = {**feature_constants(c), **_weights(network)}
+    nodes = [node_of(operation) for operation in operations(units)]
     graph = helper.make_graph(
-        nodes(units),
+        nodes,
         "suspension_velocity_sensor",
         inputs,
         outputs,
@@ -148,46 +137,6 @@ def verify(path: Path, network: CarriedNetwork, samples: int = 400) -> None:
         error = float(np.abs(a - b[:, 0].numpy())[first:].max())
         if not error <= TOLERANCE:
             raise SensorError(f"{path}: ONNX Runtime and torch differ by {error:.2g} m/s.")
-
-
-def _feature_constants(c: FeatureConfig) -> Arrays:
-    g, s = Geometry(), Slip()
-    y = np.array([g.left_y, g.right_y, g.left_y, g.right_y])
-    h = 1.0 / SAMPLE_RATE_HZ
-    slow = [c.slip_time] * 4 + [c.bias_time] * 3 + [c.level_time]
-    settling = [c.settling[0]] * 4 + [c.settling[1]] * 3 + [0.25 * c.level_time]
-    reals = {
-        "one": [[1.0]], "half": 0.5,
-        "residual_least": -s.limit, "residual_most": s.limit,
-        "slip_least": -c.slip_limit, "slip_most": c.slip_limit, "least_speed": c.least_speed,
-        "slowest_rates": [[h / time for time in slow]],
-        "zeros_before": [[time / h for time in settling]],
-        "typical": c.typical, "least_energy": c.least_level**2,
-        "moving_scales": scales(c), "moving_least": -c.largest, "moving_most": c.largest,
-        "integral_keep": 1.0 - h / np.array([c.heave_time, c.angle_time, c.angle_time]),
-        "sample_time": h, "wheelbase_samples": c.wheelbase * SAMPLE_RATE_HZ,
-        "leads": np.array([c.leads]), "age_least": 0.0, "age_most": c.depth - 3.0,
-        "two": 2.0, "minus_six": -6.0,
-        "speed_unit": 30.0, "slowness_unit": 10.0,
-    }  # fmt: skip
-    doubles = {
-        "wheel_y": y, "ones_64": [[1.0, 1.0]], "one_64": 1.0, "two_64": 2.0,
-        "per_ax": s.per_ax, "per_ay": -s.per_ay * np.sign(y),
-        "axle": 1.0 + np.array([s.front, s.front, s.rear, s.rear]),
-    }  # fmt: skip
-    wholes = {
-        "i_ax": [0], "i_ay": [1], "i_free": [2, 3, 4], "i_yaw": [5], "i_vx": [6],
-        "i_road_wheels": [7, 8], "i_wheel_speeds": WHEEL_SPEEDS, "i_steer": STEER,
-        "i_delayed": DELAYED, "first_row": [0], "second_row": [1],
-        "mean_split": [4, 3], "rate_split": [7, 1], "line_first": [0], "line_last": [c.depth - 1],
-        "column": [-1, 1], "flat": [-1], "row": [1, -1], "first_axis": [0],
-        "no_row": [0], "one_row": [1], "two_rows": [2],
-    }  # fmt: skip
-    return {
-        **{name: np.asarray(value, dtype=np.float32) for name, value in reals.items()},
-        **{name: np.asarray(value, dtype=np.float64) for name, value in doubles.items()},
-        **{name: np.asarray(value, dtype=np.int64) for name, value in wholes.items()},
-    }
 
 
 def _weights(network: CarriedNetwork) -> Arrays:

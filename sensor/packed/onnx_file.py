@@ -1,10 +1,12 @@
-"""An ONNX file read as what it is, a protocol-buffers message: no package is needed for the facts.
+"""An ONNX file read as what it is, a protocol-buffers message: no package is needed for it.
 
-Field numbers are those of onnx.proto (ModelProto, GraphProto, NodeProto, TensorProto).
+Field numbers are those of onnx.proto (ModelProto, GraphProto, NodeProto, AttributeProto,
+TensorProto).
 """
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -32,9 +34,34 @@ class Port:
     shape: tuple[int | str, ...]
 
 
+@dataclass(frozen=True)
+class Tensor:
+    """Numbers as they lie in the file: element type, shape, raw bytes (little-endian), or where the
+    writer chose so, a list.
+    """
+
+    name: str
+    type: str
+    shape: tuple[int, ...]
+    raw: bytes
+    numbers: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Node:
+    """One operator; an input or output that is left out has an empty name."""
+
+    kind: str
+    domain: str
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    attributes: dict[str, Any]
+
+
 @dataclass
 class Model:
-    """What an ONNX file says of itself."""
+    """What an ONNX file holds."""
 
     ir_version: int = 0
     producer: str = ""
@@ -48,6 +75,8 @@ class Model:
     operators: Counter[str] = field(default_factory=Counter)
     inputs: list[Port] = field(default_factory=list)
     outputs: list[Port] = field(default_factory=list)
+    nodes: list[Node] = field(default_factory=list)
+    tensors: dict[str, Tensor] = field(default_factory=dict)
     weights: dict[str, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
     external: list[str] = field(default_factory=list)
 
@@ -63,7 +92,10 @@ def read_onnx(content: bytes) -> Model:
     try:
         for number, value in _fields(content):
             _model_field(model, number, value)
-    except (IndexError, ValueError, UnicodeDecodeError, TypeError, AttributeError) as error:
+    except (
+        *(IndexError, ValueError, UnicodeDecodeError, TypeError, AttributeError, OverflowError),
+        struct.error,
+    ) as error:
         raise OnnxError(f"it is no ONNX model, or cut short ({error})") from None
     if not model.ir_version or not (model.operators or model.outputs):
         raise OnnxError("it holds no network")
@@ -137,10 +169,9 @@ def _model_field(model: Model, number: int, value: Any) -> None:
 def _graph(model: Model, content: bytes) -> None:
     for number, value in _fields(content):
         if number == 1:
-            parts = dict(_fields(value))
-            domain = parts.get(7, b"").decode()
-            kind = parts.get(4, b"").decode()
-            model.operators[f"{domain}.{kind}" if domain else kind] += 1
+            node = _node(value)
+            model.nodes.append(node)
+            model.operators[f"{node.domain}.{node.kind}" if node.domain else node.kind] += 1
         elif number == 2:
             model.graph = value.decode()
         elif number == 5:
@@ -152,18 +183,91 @@ def _graph(model: Model, content: bytes) -> None:
 
 
 def _weight(model: Model, content: bytes) -> None:
+    tensor = _tensor(content)
+    model.tensors[tensor.name] = tensor
+    model.weights[tensor.name] = (tensor.type, tensor.shape)
+    if any(number == 13 for number, _ in _fields(content)):
+        model.external.append(tensor.name)
+
+
+def _tensor(content: bytes) -> Tensor:
     dims: list[int] = []
-    name, kind = "", 0
+    numbers: list[float] = []
+    name, kind, raw = "", 0, b""
     for number, value in _fields(content):
         if number == 1:
             dims += [value] if isinstance(value, int) else _packed(value)
         elif number == 2:
             kind = int(value)
+        elif number in (4, 10):
+            numbers += _reals(value, "f" if number == 4 else "d")
+        elif number in (5, 7):
+            numbers += _wholes(value)
         elif number == 8:
             name = value.decode()
-        elif number == 13:
-            model.external.append(name)
-    model.weights[name] = (_element(kind), tuple(dims))
+        elif number == 9:
+            raw = value
+    return Tensor(name, _element(kind), tuple(dims), raw, tuple(numbers))
+
+
+def _node(content: bytes) -> Node:
+    inputs, outputs, attributes = [], [], {}
+    texts = {3: "", 4: "", 7: ""}
+    for number, value in _fields(content):
+        if number == 1:
+            inputs.append(value.decode())
+        elif number == 2:
+            outputs.append(value.decode())
+        elif number == 5:
+            name, attribute = _attribute(value)
+            attributes[name] = attribute
+        elif number in texts:
+            texts[number] = value.decode()
+    return Node(texts[4], texts[7], texts[3], tuple(inputs), tuple(outputs), attributes)
+
+
+def _attribute(content: bytes) -> tuple[str, Any]:
+    """Return name and value: number, text, tensor, or list of numbers or texts; of a subgraph its
+    bytes.
+    """
+    name = ""
+    found: Any = None
+    lists: dict[int, list[Any]] = {7: [], 8: [], 9: []}
+    for number, value in _fields(content):
+        if number == 1:
+            name = value.decode()
+        elif number == 2:
+            found = _reals(value, "f")[0]
+        elif number == 3:
+            found = _signed(value)
+        elif number == 4:
+            found = value.decode()
+        elif number == 5:
+            found = _tensor(value)
+        elif number == 6:
+            found = value
+        elif number == 7:
+            lists[7] += _reals(value, "f")
+        elif number == 8:
+            lists[8] += _wholes(value)
+        elif number == 9:
+            lists[9].append(value.decode())
+    return name, next((tuple(values) for values in lists.values() if values), found)
+
+
+def _reals(value: Any, form: str) -> list[float]:
+    """Real numbers of a field: one, whose bits were read as a whole number, or packed ones."""
+    size = 4 if form == "f" else 8
+    content = value.to_bytes(size, "little") if isinstance(value, int) else value
+    return [real for (real,) in struct.iter_unpack(f"<{form}", content)]
+
+
+def _wholes(value: Any) -> list[int]:
+    return [_signed(value)] if isinstance(value, int) else [_signed(v) for v in _packed(value)]
+
+
+def _signed(value: int) -> int:
+    return value - (1 << 64) if value >= 1 << 63 else value
 
 
 def _packed(content: bytes) -> list[int]:

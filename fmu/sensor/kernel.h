@@ -1,0 +1,35 @@
+/* What takes the time, once for each instruction set. */
+#ifndef KERNEL_H
+#define KERNEL_H
+
+#include "network.h"
+
+/* Units of an LSTM come in blocks of 16, the sums of a block's gates as
+ * [i 0-7][f 0-7][g 0-7][o 0-7][i 8-15][f 8-15][g 8-15][o 8-15]. */
+enum { BLOCK = 64, BLOCK_UNITS = 16 };
+
+/* Several states of one LSTM, row by row. */
+typedef struct {
+    size_t count;
+    const float *input; /* what the matrix multiplies: [count] rows of `depth`, `input_step` apart */
+    size_t input_step;
+    float *hidden; /* out, not the input: [count] rows of 16 * blocks, `step` apart */
+    float *cell;   /* in and out, likewise */
+    size_t step;
+} Rows;
+
+typedef struct Kernel {
+    const char *name;
+    /* sums[64 * blocks] = start + matrix input */
+    void (*product)(const Layer *layer, const float *input, float *sums);
+    /* An LSTM's first step from nothing, of the sums of its gates. */
+    void (*begin)(size_t blocks, const float *gates, float *hidden, float *cell);
+    /* One LSTM step of all rows, from sums that begin with `start` (which serves all rows) in place of the layer's. */
+    void (*advance)(const Layer *layer, const float *start, const Rows *rows);
+    /* tanh of each value; the count is a multiple of 16 */
+    void (*bend)(size_t count, float *values);
+} Kernel;
+
+const Kernel *best_kernel(void);
+
+#endif
