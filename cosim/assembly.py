@@ -139,11 +139,11 @@ def assemble(
     does not load.
     """
     wiring, description, course, plan = checked_parts(scenario, roads)
-    file = None
+    file, acting = None, scenario.acting_faults
     if sensor is None:
         settings = controller.sensor_of_run(scenario.sensor)
         file = estimator_file(scenario, settings)
-        sensor = over_gaps(estimator_of(scenario, settings), scenario.faults)
+        sensor = over_gaps(estimator_of(scenario, settings), acting)
     sensor = late_sensor(sensor, scenario.latency)
     passive = isinstance(controller, Passive) and dampers is None
     start = _start_values(scenario, description, course, plan, passive)
@@ -154,6 +154,7 @@ def assemble(
     vehicle = Vehicle(description, wiring, start, STEP_S, block.command)
     files = {"fmu": description.path, "sensor": file, "road": course.file}
     files |= {f"variant {name}": path for name, path in scenario.variants.files.items()}
+    files |= {f"fault {name}": path for name, path in scenario.fault_files.items()}
     return Assembly(
         recorder=recorder,
         initial_command=block.command.copy(),
@@ -164,7 +165,7 @@ def assemble(
             measurement_of(scenario),
             sensor,
             block,
-            fault_block(scenario.faults, scenario.seed),
+            fault_block(acting, scenario.seed),
             damper_block(scenario.latency, block.command),
         ),
         vehicle=vehicle,

@@ -66,11 +66,13 @@ class Verdict:
         return asdict(self)
 
 
-def check_metric(metric: str, labels: Sequence[str], manoeuvre: str | None = None) -> str | None:
-    """Return what is wrong with the name of a metric in a scenario with this kind of manoeuvre, or
-    None.
+def check_metric(
+    metric: str, labels: Sequence[str], manoeuvre: str | None = None, faults: Sequence[str] = ()
+) -> str | None:
+    """Return what is wrong with the name of a metric in a scenario with this kind of manoeuvre and
+    these faults, or None.
     """
-    names = metric_names(labels, manoeuvre)
+    names = metric_names(labels, manoeuvre, faults)
     if metric in names:
         return None
     kinds = _kinds_of(metric, labels)

@@ -37,6 +37,9 @@ RUN_FIGURES: Final = (
     "real_time_factor",
     "valid_samples",
 )
+FAULT_PARTS: Final = ("before", "during", "after")
+"""Parts of the run that the figures of a fault are of; `after` is 5 s long."""
+FAULT_FIGURES: Final = ("rmse_m_s", "valid_percent", "covered_percent")
 _HELD: Final = ("speed_mean_kmh", "speed_deviation_kmh", "path_deviation_m")
 _LARGEST: Final = ("path_deviation_m", "lateral_acceleration_max_m_s2", "yaw_rate_max_deg_s")
 _CHANGE: Final = ("start_speed_kmh", "time_s", "distance_m", "path_deviation_m", "yaw_change_deg")
@@ -101,9 +104,11 @@ def with_unit(value: float, metric: str) -> str:
     return f"{value:.4g} {unit_of(metric)}".rstrip()
 
 
-def metric_names(labels: Sequence[str] = (), manoeuvre: str | None = None) -> list[str]:
-    """Return every path that a limit may name, with those of the runs in `labels` and of a kind of
-    manoeuvre.
+def metric_names(
+    labels: Sequence[str] = (), manoeuvre: str | None = None, faults: Sequence[str] = ()
+) -> list[str]:
+    """Return every path that a limit may name, with those of the runs in `labels`, of a kind of
+    manoeuvre, and of the faults by their labels.
     """
     names = [*RUN_FIGURES]
     names += [f"truth.{part}.rms_m_s" for part in PARTS]
@@ -116,6 +121,9 @@ def metric_names(labels: Sequence[str] = (), manoeuvre: str | None = None) -> li
     names += [f"comfort.{figure}" for figure in COMFORT_FIGURES]
     names += [f"grip.{wheel}.{figure}" for wheel in WHEELS for figure in GRIP_FIGURES]
     names += [f"manoeuvre.{figure}" for figure in MANOEUVRE_FIGURES.get(manoeuvre or "", ())]
+    names += [
+        f"faults.{f}.{part}.{n}" for f in faults for part in FAULT_PARTS for n in FAULT_FIGURES
+    ]
     return names + [f"{label}.{name}" for label in labels for name in names]
 
 

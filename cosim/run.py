@@ -206,6 +206,7 @@ def _run(
     progress: Progress | None,
 ) -> RunOutcome:
     from cosim.compare import compare
+    from cosim.faults.figures import fault_figures
 
     label = controller.label
 
@@ -230,6 +231,7 @@ def _run(
         "largest_deviation_m": result.largest_deviation_m,
         "real_time_factor": result.simulated_s / max(result.wall_time_s, 1e-9),
         **compare(assembly.recorder, assembly.initial_command, scenario.sensor.condition),
+        "faults": fault_figures(scenario.acting_faults, assembly.recorder),
         "comfort": dict(result.comfort),
         "manoeuvre": dict(result.manoeuvre),
         "grip": dict(result.grip),
@@ -253,7 +255,16 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
         }
     )
     _write_json(output_dir / "metrics.json", metrics)
-    return Outcome(scenario, output_dir, runs, verdicts, metrics, _left_out(scenario, limits))
+    notes = (*_left_out(scenario, limits), *_idle(scenario, runs))
+    return Outcome(scenario, output_dir, runs, verdicts, metrics, notes)
+
+
+def _idle(scenario: Scenario, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
+    """Return a note on each fault that no run was long enough for."""
+    from cosim.faults.shown import idle
+
+    longest = max((run.recorder for run in runs), key=lambda recorder: recorder.rows)
+    return tuple(idle(scenario.acting_faults, longest.rows, longest.step_s))
 
 
 def _left_out(scenario: Scenario, counted: Sequence[Bounds]) -> tuple[str, ...]:
@@ -320,6 +331,9 @@ def resolved_yaml(scenario: Scenario) -> str:
         del data["vehicle"]["fmi_version"]
     if scenario.sensor.network is not None:
         data["sensor"]["network"] = str(scenario.resolve(scenario.sensor.network).resolve())
+    for fault in data["faults"]:
+        if "file" in fault:
+            fault["file"] = str(scenario.resolve(fault["file"]).resolve())
     yaml = YAML()
     yaml.width = 100
     stream = io.StringIO()

@@ -87,6 +87,7 @@ def counter(total: int) -> Callable[[Ended], None]:
 
 def outcome(shown: Outcome) -> None:
     """Say on stderr what came out of one scenario."""
+    from cosim.faults.shown import fault_table
     from cosim.tables import comparison_table, estimate_table, manoeuvre_table, verdict_table
 
     paper = shown.metrics["paper"]
@@ -102,6 +103,10 @@ def outcome(shown: Outcome) -> None:
         table(estimate_table(shown.runs[0].figures, paper, shown.metrics["sensor"]))
     else:
         table(comparison_table({one.label: one.figures for one in shown.runs}))
+    for one in shown.runs:
+        faults = fault_table(shown.scenario.acting_faults, one.figures, one.label)
+        if faults is not None:
+            table(faults)
     driven = manoeuvre_table({one.label: one.figures for one in shown.runs})
     if driven is not None:
         table(driven)

@@ -16,9 +16,9 @@ class Sample:
     `measured` (14,) the channels as they arrive, SI units, the last value where one is missing;
     `estimate` (4,) the suspension velocities [m/s], positive in extension, order FL FR RL RR, and
     `deviation` (4,) [m/s] the standard deviation that the sensor expects of their errors, NaN if it
-    expects none; `valid` whether the estimate counts; `truth` (4,) [m/s] the true velocities, for controllers that a scenario allows
-    to read them (`feedback: truth`) and for no other. The arrays are the blocks' own: not to be
-    written to, and other values at the next sample.
+    expects none; `valid` whether the estimate counts; `truth` (4,) [m/s] the true velocities, for
+    controllers that a scenario allows to read them (`feedback: truth`) and for no other. The arrays
+    are the blocks' own: not to be written to, and other values at the next sample.
     """
 
     __slots__ = ("deviation", "estimate", "measured", "truth", "valid")

@@ -31,34 +31,40 @@ from sensor.missing import HeldSamples
 if TYPE_CHECKING:
     from cosim.loop import DamperBlock, FaultBlock, SensorBlock
     from cosim.scenario.latency import Latency
+    from cosim.scenario.osp_scenario import Acting
     from sensor.estimator import Estimator
 
 _SALT: Final = 0xFA017  # keeps these draws apart from others of the same seed
 _PER_MS: Final = SAMPLE_RATE_HZ / 1000.0
 
 
-def fault_block(faults: Sequence[settings.Fault], seed: int) -> FaultBlock:
+def fault_block(acting: Sequence[Acting], seed: int) -> FaultBlock:
     """Return the faults of a scenario with this seed as one block."""
-    if not faults:
+    if not acting:
         return NoFaults()
-    made = [_fault(fault, source(fault, place, seed)) for place, fault in enumerate(faults)]
-    return FaultStack(made, any(map(leaves_gaps, faults)))
+    made = [
+        _fault(fault, source(fault, place, seed))
+        for place, entry in enumerate(acting)
+        for fault in entry.faults
+    ]
+    return FaultStack(made, leave_gaps(acting))
 
 
-def source(fault: settings.Fault, place: int, seed: int) -> np.random.Generator:
+def source(fault: settings.PlainFault, place: int, seed: int) -> np.random.Generator:
     """Return what a fault draws from: by the scenario's seed, and its own or its place."""
     own = getattr(fault, "seed", None)
     return np.random.default_rng([_SALT, seed, *((0, place) if own is None else (1, own))])
 
 
-def leaves_gaps(fault: settings.Fault) -> bool:
-    """Whether a fault may make a channel NaN."""
-    return isinstance(fault, settings.Dropout) and fault.fill == "nan"
+def leave_gaps(acting: Sequence[Acting]) -> bool:
+    """Whether the faults may make a channel NaN."""
+    faults = (fault for entry in acting for fault in entry.faults)
+    return any(isinstance(f, settings.Dropout) and f.fill == "nan" for f in faults)
 
 
-def over_gaps(estimator: Estimator, faults: Sequence[settings.Fault]) -> SensorBlock:
+def over_gaps(estimator: Estimator, acting: Sequence[Acting]) -> SensorBlock:
     """Return the estimator, made to bear NaN if one of the faults makes a channel NaN."""
-    return HeldSamples(estimator) if any(map(leaves_gaps, faults)) else estimator
+    return HeldSamples(estimator) if leave_gaps(acting) else estimator
 
 
 def late_sensor(sensor: SensorBlock, latency: Latency) -> SensorBlock:
@@ -73,7 +79,7 @@ def damper_block(latency: Latency, initial: Array) -> DamperBlock:
     return LateDampers(samples, initial) if samples else PromptDampers()
 
 
-def _fault(fault: settings.Fault, random: np.random.Generator) -> Fault:
+def _fault(fault: settings.PlainFault, random: np.random.Generator) -> Fault:
     window = Window.of(fault.start_s, fault.end_s, getattr(fault, "ramp_s", 0.0))
     if isinstance(fault, settings.SwappedWheels):
         one, other = (CHANNEL_NAMES.index(f"Car.v{wheel}") for wheel in fault.wheels)

@@ -117,6 +117,7 @@ def _files(scenario: Scenario, fmu: Path, road: Path) -> list[dict[str, str]]:
     files: dict[str, Path | None] = {
         "scenario": scenario.file, "vehicle": fmu, "road": road, **_sensors(scenario),
         **{f"variant {n}": p for n, p in scenario.variants.files.items()},
+        **{f"fault {n}": p for n, p in scenario.fault_files.items()},
     }  # fmt: skip
     return [
         {"what": what, "path": str(path), "sha256": sha256(path) if path.is_file() else "missing"}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import import_module, resources
 from pathlib import Path
@@ -18,12 +18,14 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import CosimError
+from cosim.faults.shown import compared, fault_table, spans
 from cosim.metrics import WHEELS
 from cosim.recorder import Recorder
 from cosim.tables import Table, comparison_table, estimate_table, manoeuvre_table
 
 if TYPE_CHECKING:
     from cosim.run import Outcome, RunOutcome
+    from cosim.scenario.osp_scenario import Acting
 
 MS_TO_KMH = 3.6
 
@@ -35,6 +37,7 @@ class ReportError(CosimError):
 def write_report(outcome: Outcome, versions: Mapping[str, Any], path: Path) -> None:
     """Write the report to `path`; raises `ReportError` where uplot-python is not installed."""
     script, style = _uplot()
+    acting = outcome.scenario.acting_faults
     page = _page().render(
         outcome=outcome,
         scenario=outcome.scenario,
@@ -42,12 +45,13 @@ def write_report(outcome: Outcome, versions: Mapping[str, Any], path: Path) -> N
         manoeuvre=manoeuvre_table({run.label: run.figures for run in outcome.runs}),
         comparison=_comparison(outcome),
         tables={run.label: _table(outcome, run) for run in outcome.runs},
+        faults={run.label: fault_table(acting, run.figures) for run in outcome.runs},
         facts={run.label: facts(run) for run in outcome.runs},
         uplot_script=script,
         uplot_style=style,
         script=_template("report.js"),
         style=_template("report.css"),
-        data=_json({"runs": [_signals(run) for run in outcome.runs]}),
+        data=_json({"runs": [_signals(run, acting) for run in outcome.runs]}),
     )
     path.write_text(page, encoding="utf-8")
 
@@ -87,8 +91,8 @@ def _table(outcome: Outcome, run: RunOutcome) -> Table:
     return estimate_table(run.figures, outcome.metrics["paper"], outcome.metrics["sensor"])
 
 
-def _signals(run: RunOutcome) -> dict[str, Any]:
-    """Return truth, estimate, speed and damper command of a run for the page's script."""
+def _signals(run: RunOutcome, acting: Sequence[Acting]) -> dict[str, Any]:
+    """Return truth, estimate, speed, damper command and faults of a run for the page's script."""
     recorder = run.recorder
     # A column of the estimate that is not valid yet is a gap in the plot, not a zero.
     estimate = np.where(recorder.group("valid") > 0, recorder.group("estimate"), np.nan)
@@ -106,6 +110,14 @@ def _signals(run: RunOutcome) -> dict[str, Any]:
         "wheels": wheels,
         "speed": _speed(recorder),
         "command": [_base64(column) for column in command.T] if commanded else None,
+        "faults": spans(acting, recorder.rows, recorder.step_s),
+        "channels": [
+            {
+                name: value if isinstance(value, str) else _base64(value)
+                for name, value in one.items()
+            }
+            for one in (compared(acting, recorder) if acting else ())
+        ],
     }
 
 

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from cosim.check.unit_names import readings
 from cosim.errors import did_you_mean
+from cosim.scenario.vehicle import Variable
 from sensor.channels import CHANNEL_NAMES, CHANNELS
 
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
@@ -108,6 +109,20 @@ def _factor(unit: str, channels: str, per_second: bool) -> float:
             {"unit": unit, "wanted": wanted, "example": example},
         )
     return fits[0].factor
+
+
+def in_si(channel: str, variable: Variable) -> Variable:
+    """Return the variable that stands for a channel with the factor of its unit in its scale."""
+    if channel not in CHANNEL_NAMES:
+        raise PydanticCustomError(
+            "channel",
+            "'{name}' is no channel{hint}",
+            {"name": channel, "hint": did_you_mean(channel, CHANNEL_NAMES)},
+        )
+    if variable.unit is None:
+        return variable
+    factor = _factor(variable.unit, _UNITS[channel], per_second=False)
+    return variable.model_copy(update={"unit": None, "scale": variable.scale * factor})
 
 
 def _value(value: object, info: ValidationInfo) -> object:

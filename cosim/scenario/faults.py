@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Final, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from cosim.scenario.fault_channels import Channels, OptionalValue, Rate, Value
+from cosim.scenario.fault_channels import Channels, OptionalValue, Rate, Value, in_si
 from cosim.scenario.model import NAME_PATTERN, Model, with_unit
+from cosim.scenario.vehicle import Variable
 
 Corner = Literal["FL", "FR", "RL", "RR"]
 SAMPLE_S: Final = 0.01
@@ -62,7 +64,7 @@ class _Ramped(_Timed):
     @classmethod
     def _ramp_has_room(cls, value: float, info: ValidationInfo) -> float:
         start, end = info.data.get("start_s"), info.data.get("end_s")
-        if start is not None and end is not None and 2 * value > end - start:
+        if start is not None and end is not None and 2 * value > (end - start) * (1 + 1e-9):
             raise PydanticCustomError(
                 "ramp",
                 "must be at most half the time from start_s to end_s, {half} s",
@@ -231,7 +233,29 @@ class SwappedWheels(_Timed):
         return value
 
 
-Fault = Annotated[
+class OspScenario(Model):
+    """Events of a scenario file of the Open Simulation Platform: override, bias and reset."""
+
+    kind: Literal["osp_scenario"]
+    name: str | None = Field(
+        default=None, pattern=NAME_PATTERN, description="name in figures and report"
+    )
+    file: str = Field(min_length=1, description="JSON or YAML file, relative to the scenario file")
+    model: str | None = Field(
+        default=None, description="the model that is the vehicle; events of others are left out"
+    )
+    variables: dict[str, Variable] = Field(
+        default_factory=dict, description="channel to the variable that stands for it in the file"
+    )
+
+    @field_validator("variables")
+    @classmethod
+    def _channels_in_si(cls, value: dict[str, Variable]) -> dict[str, Variable]:
+        """Return the variables with all of the way to the channels' unit in their scale."""
+        return {channel: in_si(channel, variable) for channel, variable in value.items()}
+
+
+PlainFault = (
     Noise
     | Bias
     | Drift
@@ -243,15 +267,17 @@ Fault = Annotated[
     | Dropout
     | Stuck
     | Spikes
-    | SwappedWheels,
-    Field(discriminator="kind"),
-]
+    | SwappedWheels
+)
+Fault = Annotated[PlainFault | OspScenario, Field(discriminator="kind")]
 
 
-def labels(faults: tuple[Fault, ...]) -> list[str]:
-    """Return what each fault is called: its name or its kind, then _2, _3 ... for further ones."""
-    names = [fault.name or fault.kind for fault in faults]
-    return [
-        name if names[:i].count(name) == 0 else f"{name}_{names[:i].count(name) + 1}"
-        for i, name in enumerate(names)
-    ]
+def labels(faults: Sequence[Fault]) -> list[str]:
+    """Return what each fault is called: its name or its kind, numbered where it comes again."""
+    return numbered([fault.name or fault.kind for fault in faults])
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """Return names with _2, _3 ... at those that stand there for the second time and so on."""
+    before = [names[:i].count(name) for i, name in enumerate(names)]
+    return [f"{n}_{k + 1}" if k else n for n, k in zip(names, before, strict=True)]

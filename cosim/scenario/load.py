@@ -12,7 +12,9 @@ from cosim.errors import InputError, Place, Problem, did_you_mean
 from cosim.limits import check_metric
 from cosim.scenario.combinations import combination_problems
 from cosim.scenario.controllers import label_of
+from cosim.scenario.faults import numbered
 from cosim.scenario.messages import problems_of
+from cosim.scenario.osp_scenario import acting
 from cosim.scenario.overrides import Override, apply_override, parse_override
 from cosim.scenario.schema import Scenario, json_schema
 from cosim.scenario.source import Key, Source, read
@@ -66,6 +68,7 @@ def load_with(
         scenario._variants, found = combine(vehicle.variants, vehicle.parameters, source)
         problems += found
         problems += combination_problems(scenario)
+        problems += acting(scenario.faults, source)[1]
     if problems:
         raise InputError(sorted(problems, key=_order))
     return scenario
@@ -121,9 +124,10 @@ def _name_problems(data: dict[str, Any], source: Source) -> list[Problem]:
     """Check the names that are known before the run: metrics and the paper's rows."""
     problems = []
     limits, labels, kind = data.get("limits"), _labels(data), _value(data, ("manoeuvre", "kind"))
+    faults = _fault_labels(data)
     for index, limit in enumerate(limits if isinstance(limits, list) else ()):
         metric = limit.get("metric") if isinstance(limit, dict) else None
-        message = check_metric(metric, labels, kind) if isinstance(metric, str) else None
+        message = check_metric(metric, labels, kind, faults) if isinstance(metric, str) else None
         if message:
             problems.append(Problem(message, source.locate(("limits", index, "metric"))))
     row, rows = data.get("paper_row"), [printed.scenario for printed in paper_rows()]
@@ -131,6 +135,13 @@ def _name_problems(data: dict[str, Any], source: Source) -> list[Problem]:
         message = f"'{row}' is not a row of the paper's Table 4{did_you_mean(row, rows)}"
         problems.append(Problem(message, source.locate(("paper_row",))))
     return problems
+
+
+def _fault_labels(data: dict[str, Any]) -> list[str]:
+    """Names of the faults, as far as the raw values tell."""
+    given = data.get("faults")
+    items = [item for item in given if isinstance(item, dict)] if isinstance(given, list) else []
+    return numbered([str(item.get("name") or item.get("kind")) for item in items])
 
 
 def _labels(data: dict[str, Any]) -> list[str]:

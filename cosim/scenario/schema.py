@@ -22,11 +22,12 @@ from pydantic_core import PydanticCustomError
 from cosim.errors import Place, Problem, did_you_mean
 from cosim.scenario.controllers import Controller, Passive
 from cosim.scenario.driver import Driver
-from cosim.scenario.faults import Fault, labels
+from cosim.scenario.faults import Fault, OspScenario, labels
 from cosim.scenario.latency import Latency
 from cosim.scenario.limit import Limit
 from cosim.scenario.manoeuvre import Manoeuvre
 from cosim.scenario.model import Model, with_unit
+from cosim.scenario.osp_scenario import Acting, acting
 from cosim.scenario.road import Road
 from cosim.scenario.sensor import Sensor
 from cosim.scenario.source import Key, Source
@@ -131,6 +132,17 @@ class Scenario(Model):
         if name in self.vehicle.parameters or name not in self._variants.origin:
             return ("vehicle", "parameters", name)
         return ("vehicle", "variants", self._variants.origin[name])
+
+    @property
+    def acting_faults(self) -> tuple[Acting, ...]:
+        """What the entries of `faults` come to, by their labels and in their order."""
+        return acting(self.faults, self._source)[0]
+
+    @property
+    def fault_files(self) -> dict[str, Path]:
+        """The files that faults are read from, by the faults' labels."""
+        named = zip(labels(self.faults), self.faults, strict=True)
+        return {n: self.resolve(f.file) for n, f in named if isinstance(f, OspScenario)}
 
     @property
     def file(self) -> Path | None:

@@ -49,6 +49,17 @@
     value: (_, value) => (value === null || value === undefined ? "–" : value.toFixed(digits) + " " + unit),
   });
 
+  // Grey behind the lines, where a fault acts.
+  const shade = plot => {
+    const { left, top, width, height } = plot.bbox;
+    const inside = time => Math.min(Math.max(plot.valToPos(time, "x", true), left), left + width);
+    plot.ctx.save();
+    plot.ctx.fillStyle = colour("fault");
+    runs[shown].faults.forEach(([start, end]) =>
+      plot.ctx.fillRect(inside(start), top, inside(end) - inside(start), height));
+    plot.ctx.restore();
+  };
+
   const draw = (parent, height, label, time, columns, series, options = {}) => {
     const mousemove = (type) => type === "mousemove" || type === "mouseleave";
     const plot = new uPlot({
@@ -61,7 +72,7 @@
         sync: { key: "time", setSeries: false, filters: { pub: mousemove, sub: mousemove } },
         drag: { x: true, y: false, setScale: !options.whole },
       },
-      hooks: options.whole ? { setSelect: [zoomToSelection] } : { setScale: [zoomLike] },
+      hooks: { drawClear: [shade], ...(options.whole ? { setSelect: [zoomToSelection] } : { setScale: [zoomLike] }) },
     }, [time, ...columns], parent);
     plot.box = parent;
     plot.whole = Boolean(options.whole);
@@ -104,6 +115,12 @@
       (value !== null && Math.abs(value) > worst.size ? { time: time[i], size: Math.abs(value) } : worst), { time: 0, size: -1 });
   };
 
+  const channel = (signal, time) => {
+    const where = document.getElementById("channels");
+    draw(panel(where, signal.name), 150, signal.unit, time, [column(signal.measured), column(signal.given)],
+      [line("measured", "truth", signal.unit, 4, 1.75), line("given", "error", signal.unit, 4)], { last: true });
+  };
+
   // Shows `seconds` around the largest error of any wheel, or the whole run for 0.
   const span = seconds => {
     const end = (runs[shown].rows - 1) * runs[shown].step;
@@ -118,10 +135,12 @@
     plots = [];
     document.getElementById("overview").replaceChildren();
     document.getElementById("wheels").replaceChildren();
+    document.getElementById("channels")?.replaceChildren();
     const run = runs[index];
     const time = Array.from({ length: run.rows }, (_, k) => k * run.step);
     overview(run, time);
     worst = Object.keys(names).map(name => wheel(run, name, time)).reduce((a, b) => (b.size > a.size ? b : a));
+    run.channels.forEach(signal => channel(signal, time));
     span(10);
     document.querySelectorAll("section.run").forEach(part => { part.hidden = part.dataset.run !== String(index); });
     document.querySelectorAll(".runs button").forEach(button => {
