@@ -55,11 +55,30 @@ TRAVEL: Final = tuple(
 TYRE_LOAD: Final = tuple(
     _own(f"Car.Fz{c}", "N", f"vertical tyre force {c}", False) for c in CORNERS
 )
+ATTITUDE: Final = (
+    _own("Car.tz", "m", "position of the centre of gravity, inertial z", False),
+    _own("Car.Roll", "rad", "roll angle, positive right side down", False),
+    _own("Car.Pitch", "rad", "pitch angle, positive nose down", False),
+)
+DAMPER_FORCE: Final = tuple(
+    _own(f"Car.Damp{c}.Frc", "N", f"damper element force {c}, positive against extension", False)
+    for c in CORNERS
+)
+DAMPER_SPEED: Final = tuple(
+    _own(f"Car.Damp{c}.v", "m/s", f"damper element velocity {c}, positive in extension", False)
+    for c in CORNERS
+)
+VALVE: Final = tuple(
+    _own(f"Car.Damp{c}.Ctrl", "1", f"valve position of the damper {c}, 0 soft, 1 hard", False)
+    for c in CORNERS
+)
 GRIP_SHARE: Final = tuple(
     _own(f"Car.GripShare{c}", "1", f"share of its grip that the tyre {c} uses", False)
     for c in CORNERS
 )
-RIDE: Final = (*SEAT, *TRAVEL, *TYRE_LOAD, *GRIP_SHARE)
+RIDE: Final = (
+    *SEAT, *TRAVEL, *TYRE_LOAD, *ATTITUDE, *DAMPER_FORCE, *DAMPER_SPEED, *VALVE, *GRIP_SHARE,
+)  # fmt: skip
 
 SENSOR_STAGE: Final = tuple(_own(c.name, c.unit, c.description, False) for c in STAGE)
 ROAD_HEIGHT: Final = tuple(_own(c.name, c.unit, c.description, False) for c in ROAD)
