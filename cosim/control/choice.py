@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from cosim.control.add import Add, SkyhookAdd
+from cosim.control.body import Body
 from cosim.control.damper_map import DamperMap
 from cosim.control.fixed import FixedDampers
-from cosim.control.skyhook import Skyhook
+from cosim.control.hybrid import Hybrid
+from cosim.control.law import Law, LawController
+from cosim.control.modal import ModalGains, ModalSkyhook
+from cosim.control.skyhook import Skyhook, TwoStateSkyhook
 from cosim.loop import ControllerBlock
 from cosim.scenario import controllers as settings
 from sensor.channels import PASSIVE_COMMAND
@@ -16,6 +21,25 @@ def controller_of(chosen: settings.Controller, dampers: DamperMap) -> Controller
         return FixedDampers(PASSIVE_COMMAND)
     if isinstance(chosen, settings.Fixed):
         return FixedDampers(chosen.command)
-    return Skyhook(
-        chosen.feedback == "truth", chosen.gain_ns_per_m, chosen.initial_command, dampers
-    )
+    body = Body()
+    law = _law(chosen, dampers, body)
+    return LawController(law, chosen.feedback == "truth", chosen.initial_command, body)
+
+
+def _law(chosen: settings.LawSettings, dampers: DamperMap, body: Body) -> Law:
+    match chosen:
+        case settings.Skyhook():
+            return Skyhook(dampers, chosen.gain_ns_per_m)
+        case settings.TwoStateSkyhook():
+            return TwoStateSkyhook(chosen.hard_command)
+        case settings.Add():
+            return Add(chosen.hard_command)
+        case settings.SkyhookAdd():
+            return SkyhookAdd(chosen.hard_command, chosen.crossover_hz)
+        case settings.Hybrid():
+            return Hybrid(dampers, chosen.gain_ns_per_m, chosen.skyhook_share)
+        case settings.ModalSkyhook():
+            gains = ModalGains(
+                chosen.heave_ns_per_m, chosen.roll_nms_per_rad, chosen.pitch_nms_per_rad
+            )
+            return ModalSkyhook(dampers, body.mixing, gains)

@@ -1,70 +1,79 @@
-"""The force of the adjustable dampers, as a controller knows it."""
+"""The force of the adjustable dampers, as every controller knows it.
+
+The curves are the vehicle's (monotone cubics through its tables, `sensor.kalman.damper`); between
+soft and hard the force is in proportion to the command.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from sensor.kalman.damper import Curve
+from sensor.kalman.damper import DamperMap as Tables
+
 Array = npt.NDArray[np.float64]
 
+CORNERS = ("FL", "FR", "RL", "RR")
+LEAST_SPAN = 1.0  # N; where soft and hard are nearer to each other, no command is better
 
-@dataclass(frozen=True)
+
 class DamperMap:
-    """Forces of the semi-active damper at the front wheel [N] over speed [m/s]: command 0 and
-    command 1.
+    """Forces of the four dampers at their wheels, order FL FR RL RR, in both directions.
 
-    The figures are the vehicle FMU's defaults (parameters Damp.Soft*, Damp.Hard*); linear between
-    the points and beyond the last. `scale` (4,) multiplies the force at FL FR RL RR.
+    Forces [N] are positive against extension, extension speeds v [m/s] positive in extension, the
+    command is 0 soft to 1 hard.
     """
 
-    speed: tuple[float, ...] = (0.0, 0.05, 0.1, 0.25, 0.5, 1.0)
-    soft_rebound: tuple[float, ...] = (0.0, 110.0, 190.0, 330.0, 560.0, 1000.0)
-    soft_compression: tuple[float, ...] = (0.0, 65.0, 120.0, 230.0, 380.0, 650.0)
-    hard_rebound: tuple[float, ...] = (0.0, 900.0, 1500.0, 2350.0, 3300.0, 4900.0)
-    hard_compression: tuple[float, ...] = (0.0, 520.0, 900.0, 1550.0, 2150.0, 3000.0)
-    scale: tuple[float, float, float, float] = (1.0, 1.0, 1.33, 1.33)
+    def __init__(self, tables: Tables | None = None) -> None:
+        tables = tables or Tables()
+        self.tables = tables
+        self._soft, self._hard = Curve(*tables.soft).force, Curve(*tables.hard).force
+
+    def force(self, wheel: int, v: float, command: float) -> float:
+        """Return the force at an extension speed under a command."""
+        soft, hard = self._soft(v)[0], self._hard(v)[0]
+        return self.tables.scale[wheel] * (soft + command * (hard - soft))
+
+    def command(self, wheel: int, wanted: float, v: float) -> float:
+        """Return the command whose force comes nearest to `wanted` [N] at an extension speed.
+
+        A damper only resists: a force that would push along the motion is met by soft.
+        """
+        if wanted * v <= 0.0:
+            return 0.0
+        soft, hard = self._soft(v)[0], self._hard(v)[0]
+        span = hard - soft
+        if abs(span) <= LEAST_SPAN:
+            return 0.0
+        return min(max((wanted / self.tables.scale[wheel] - soft) / span, 0.0), 1.0)
+
+    def commands(self, wanted: Array, v: Array, out: Array) -> None:
+        """Write the commands (4,) for wanted forces (4,) [N] at extension speeds (4,) to `out`."""
+        for i, (force, speed) in enumerate(zip(wanted.tolist(), v.tolist(), strict=True)):
+            out[i] = self.command(i, force, speed)
 
 
 def damper_map(parameters: Mapping[str, object]) -> DamperMap:
     """Return the map of the vehicle FMU's parameters Damp.*; the rest keeps its default."""
-    default = DamperMap()
+    default = Tables()
 
-    def forces(name: str, values: tuple[float, ...]) -> tuple[float, ...]:
-        read = (parameters.get(f"Damp.{name}{i}", values[i]) for i in range(1, len(values)))
-        return (0.0, *(float(str(force)) for force in read))
+    def table(end: str, usual: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+        ways = zip(("Rebound", "Compression"), usual, strict=True)
+        return tuple(
+            tuple(_number(parameters, f"Damp.{end}{way}{i}", f) for i, f in enumerate(forces, 1))
+            for way, forces in ways
+        )
 
-    corners = zip(("FL", "FR", "RL", "RR"), default.scale, strict=True)
-    fl, fr, rl, rr = (float(str(parameters.get(f"Damp.Scale{c}", s))) for c, s in corners)
+    corners = zip(CORNERS, default.scale, strict=True)
+    fl, fr, rl, rr = (_number(parameters, f"Damp.Scale{c}", s) for c, s in corners)
+    soft, hard = table("Soft", default.soft), table("Hard", default.hard)
     return DamperMap(
-        default.speed,
-        forces("SoftRebound", default.soft_rebound),
-        forces("SoftCompression", default.soft_compression),
-        forces("HardRebound", default.hard_rebound),
-        forces("HardCompression", default.hard_compression),
-        (fl, fr, rl, rr),
+        Tables(soft=(soft[0], soft[1]), hard=(hard[0], hard[1]), scale=(fl, fr, rl, rr))
     )
 
 
-def tables(d: DamperMap) -> tuple[Array, Array, Array]:
-    """Return speed, soft and hard force from full compression to full rebound, ends extended to 5
-    m/s.
-    """
-    far = 5.0
-
-    def extended(values: tuple[float, ...]) -> list[float]:
-        slope = (values[-1] - values[-2]) / (d.speed[-1] - d.speed[-2])
-        return [*values, values[-1] + slope * (far - d.speed[-1])]
-
-    def joined(compression: tuple[float, ...], rebound: tuple[float, ...]) -> Array:
-        return np.array([-v for v in extended(compression)[:0:-1]] + extended(rebound))
-
-    speed = (*d.speed, far)
-    both = np.array([-v for v in speed[:0:-1]] + list(speed))
-    return (
-        both,
-        joined(d.soft_compression, d.soft_rebound),
-        joined(d.hard_compression, d.hard_rebound),
-    )
+def _number(parameters: Mapping[str, object], name: str, usual: float) -> float:
+    return float(str(parameters.get(name, usual)))

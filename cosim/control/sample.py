@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 class Sample:
     """What is known at t_k; the loop makes one object and renews it at every sample.
 
-    `measured` (14,) the channels as they arrive, SI units, the last value where one is missing;
+    `measured` (14,) the channels as they arrive, SI units, one that is missing with its last value;
     `estimate` (4,) the suspension velocities [m/s], positive in extension, order FL FR RL RR, and
     `deviation` (4,) [m/s] the standard deviation that the sensor expects of their errors, NaN if it
     expects none; `valid` whether the estimate counts; `truth` (4,) [m/s] the true velocities, for

@@ -1,4 +1,11 @@
-"""Continuous skyhook."""
+"""Skyhook: the damper that would hang between body and sky, as far as a real one can stand for it.
+
+Karnopp, Crosby & Harwood, Vibration control using semi-active force generators, J. Eng. Ind. 96
+(1974): the force gain * v_body where it resists the damper's own motion (body velocity, upward, and
+suspension velocity, extension, of one sign), the least one elsewhere. The two-state form knows soft
+and hard alone (Savaresi, Poussot-Vassal, Spelta, Sename & Dugard, Semi-active suspension control
+design for vehicles, 2010, chapter 6).
+"""
 
 from __future__ import annotations
 
@@ -7,9 +14,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosim.control.damper_map import DamperMap, tables
-from cosim.control.sample import Sample
-from sensor.body_motion import BodyMotion
+from cosim.control.body import Body
+from cosim.control.damper_map import DamperMap
 
 Array = npt.NDArray[np.float64]
 
@@ -17,42 +23,26 @@ SKYHOOK_GAIN: Final = 3500.0  # N s/m, between comfort and tyre load: docs/close
 
 
 class Skyhook:
-    """Continuous skyhook (Karnopp, Crosby & Harwood, J. Eng. Ind. 96, 1974) on a real damper's map.
+    """Continuous skyhook: each damper comes as near to gain * v_body as its map lets it."""
 
-    The damper should pull the body with gain * v_body against the sky. It can only resist its own
-    motion: where body velocity (upward) and suspension velocity (extension) have one sign it is set
-    to the force that comes nearest, elsewhere to soft. v_body is estimated from the channels, v_rel
-    is the truth or the sensor's estimate. Until an estimate is valid the commands stay at
-    `initial`.
-    """
+    def __init__(self, dampers: DamperMap, gain: float = SKYHOOK_GAIN) -> None:
+        self._dampers, self._gain = dampers, gain
+        self._wanted = np.zeros(4)
 
-    def __init__(
-        self,
-        on_truth: bool,
-        gain: float | None = None,
-        initial: float = 0.0,
-        dampers: DamperMap | None = None,
-        body: BodyMotion | None = None,
-    ) -> None:
-        dampers = dampers or DamperMap()
-        self.command = np.full(4, initial)
-        self._on_truth = on_truth
-        self._gain = SKYHOOK_GAIN if gain is None else gain
-        self._body = body or BodyMotion()
-        self._scale = np.array(dampers.scale)
-        self._speed, self._soft, self._hard = tables(dampers)
+    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+        """Write the commands (4,) to `out`; see `cosim.control.law.Law`."""
+        np.multiply(self._gain, body.velocity, out=self._wanted)
+        self._dampers.commands(self._wanted, relative, out)
 
-    def step(self, sample: Sample) -> Array:
-        """Return the commands (4,), 0 soft to 1 hard, the same array every time."""
-        body = self._body.step(sample.measured)
-        if not (self._on_truth or sample.valid):
-            return self.command
-        relative = sample.truth if self._on_truth else sample.estimate
-        soft = np.interp(relative, self._speed, self._soft)
-        hard = np.interp(relative, self._speed, self._hard)
-        wanted = self._gain / self._scale * body
-        span = hard - soft
-        np.divide(wanted - soft, span, out=self.command, where=np.abs(span) > 1.0)
-        self.command[(body * relative <= 0) | (np.abs(span) <= 1.0)] = 0.0
-        np.clip(self.command, 0.0, 1.0, out=self.command)
-        return self.command
+
+class TwoStateSkyhook:
+    """Two-state skyhook: `hard` where the damper would slow the body down, else soft."""
+
+    def __init__(self, hard: float = 1.0) -> None:
+        self._hard = hard
+
+    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+        """Write the commands (4,) to `out`; see `cosim.control.law.Law`."""
+        pairs = zip(body.velocity.tolist(), relative.tolist(), strict=True)
+        for i, (velocity, extension) in enumerate(pairs):
+            out[i] = self._hard if velocity * extension > 0.0 else 0.0

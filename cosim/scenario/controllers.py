@@ -7,6 +7,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from cosim.control.add import CROSSOVER_HZ
+from cosim.control.hybrid import SKYHOOK_SHARE
+from cosim.control.modal import ModalGains
+from cosim.control.skyhook import SKYHOOK_GAIN
 from cosim.scenario.model import NAME_PATTERN, Model, with_unit
 from cosim.scenario.sensor import EstimatorName, Sensor
 from sensor.estimators import names
@@ -72,19 +76,90 @@ class Law(OneRun):
     )
 
 
-class Skyhook(Law):
-    """Continuous skyhook control of the four dampers."""
+class Gained(Law):
+    """A law with a damping of its own."""
 
-    kind: Literal["skyhook"]
-    gain_ns_per_m: float | None = Field(
-        default=None,
+    gain_ns_per_m: float = Field(
+        default=SKYHOOK_GAIN,
         gt=0,
         description="skyhook damping of one corner",
         json_schema_extra=with_unit("N s/m"),
     )
 
 
-Controller = Annotated[Passive | Fixed | Skyhook, Field(discriminator="kind")]
+class Skyhook(Gained):
+    """Continuous skyhook control of the four dampers."""
+
+    kind: Literal["skyhook"]
+
+
+class TwoState(Law):
+    """A law that knows soft and hard alone."""
+
+    hard_command: float = Field(
+        default=1.0, gt=0, le=1, description="damper command of the hard state, 1 hardest"
+    )
+
+
+class TwoStateSkyhook(TwoState):
+    """Skyhook that switches between soft and hard."""
+
+    kind: Literal["skyhook_two_state"]
+
+
+class Add(TwoState):
+    """Acceleration-driven damping."""
+
+    kind: Literal["add"]
+
+
+class SkyhookAdd(TwoState):
+    """Skyhook below a frequency, acceleration-driven damping above it."""
+
+    kind: Literal["sh_add"]
+    crossover_hz: float = Field(
+        default=CROSSOVER_HZ,
+        gt=0,
+        description="where the one law hands over to the other",
+        json_schema_extra=with_unit("Hz"),
+    )
+
+
+class Hybrid(Gained):
+    """Skyhook and groundhook, weighed against each other."""
+
+    kind: Literal["hybrid"]
+    skyhook_share: float = Field(
+        default=SKYHOOK_SHARE, ge=0, le=1, description="1 skyhook alone, 0 groundhook alone"
+    )
+
+
+class ModalSkyhook(Law):
+    """Skyhook on heave, roll and pitch of the body."""
+
+    kind: Literal["modal_skyhook"]
+    heave_ns_per_m: float = Field(
+        default=ModalGains.heave,
+        ge=0,
+        json_schema_extra=with_unit("N s/m"),
+        description="damping of heave against the sky",
+    )
+    roll_nms_per_rad: float = Field(
+        default=ModalGains.roll,
+        ge=0,
+        json_schema_extra=with_unit("N m s/rad"),
+        description="damping of roll against the sky",
+    )
+    pitch_nms_per_rad: float = Field(
+        default=ModalGains.pitch,
+        ge=0,
+        json_schema_extra=with_unit("N m s/rad"),
+        description="damping of pitch against the sky",
+    )
+
+
+LawSettings = Skyhook | TwoStateSkyhook | Add | SkyhookAdd | Hybrid | ModalSkyhook
+Controller = Annotated[Passive | Fixed | LawSettings, Field(discriminator="kind")]
 
 
 def label_of(controller: dict[str, Any]) -> str:
