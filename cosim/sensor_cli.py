@@ -175,7 +175,7 @@ def search(recipe: Path, data: Path, out: Path, jobs: int, samples: int, summary
 
 
 @sensor.command()
-@click.argument("checkpoint", type=click.Path(path_type=Path))
+@click.argument("source", type=click.Path(path_type=Path))
 @click.option(
     "-o",
     "--out",
@@ -183,9 +183,23 @@ def search(recipe: Path, data: Path, out: Path, jobs: int, samples: int, summary
     required=True,
     type=click.Path(path_type=Path, dir_okay=False),
 )
-def export(checkpoint: Path, out: Path) -> None:
-    """Write the best network so far of a training's CHECKPOINT (checkpoint.pt) as ONNX."""
-    with failures_as_exit_codes():
-        from sensor import families
+@click.option(
+    "--streaming",
+    is_flag=True,
+    help="SOURCE is a windowed ONNX network: write its streaming form, for other tools.",
+)
+def export(source: Path, out: Path, streaming: bool) -> None:
+    """Write the best network so far of a training, SOURCE = checkpoint.pt, as ONNX.
 
-        families.export(checkpoint, out)
+    The file is the windowed network, or the one with carried state. `cosim` itself makes the
+    streaming form of a windowed network when it opens the file.
+    """
+    with failures_as_exit_codes():
+        if streaming:
+            from sensor.streaming.export import export_streaming
+
+            export_streaming(source, out)
+        else:
+            from sensor import families
+
+            families.export(source, out)

@@ -4,7 +4,8 @@ inside the graph.
 The graph is built node by node: a dozen nodes, every name chosen, no exporter in between. The
 forward direction is one LSTM operator over the window; the backward direction is its one step on
 the last sample, exact for the last-sample tap (see `sensor.network`). A network is written only
-after ONNX Runtime has reproduced torch's output to 1e-5 m/s.
+after ONNX Runtime has reproduced torch's output to 1e-5 m/s, sample by sample in the streaming form
+(`sensor.streaming`) too, which the run time makes of the file when it opens it.
 """
 
 import json
@@ -23,15 +24,14 @@ from sensor.errors import SensorError
 from sensor.features import WHEEL_SPEEDS
 from sensor.metadata import METADATA_KEY
 from sensor.network import TAP, BiLstmNetwork
-from sensor.operation import Operation
+from sensor.operation import IR_VERSION, OPSET, Operation
 from sensor.residual_matrices import (
     ResidualMatrices,
     residual_constants,
     residual_operations,
 )
+from sensor.streaming.export import verified
 
-OPSET = 17
-IR_VERSION = 8
 TOLERANCE = 1e-5
 RAW = "the channels as they are"
 RESIDUAL = (
@@ -48,13 +48,19 @@ def export_windowed(
 ) -> Path:
     """Write `network` to `path` with its metadata and the `training` record; return the path.
 
-    Raises SensorError, and writes nothing, if ONNX Runtime and torch differ by more than 1e-5 m/s.
+    Raises SensorError, and writes nothing, if ONNX Runtime and torch, or the network's streaming
+    form and the file, differ by more than 1e-5 m/s.
     """
     model = build_windowed(network, training)
     verify(model, network)
     path = Path(path)
     temporary = path.with_suffix(".part")
     onnx.save(model, str(temporary))
+    try:
+        verified(temporary)
+    except SensorError:
+        temporary.unlink()
+        raise
     temporary.replace(path)
     return path
 

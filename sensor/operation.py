@@ -6,6 +6,9 @@ from typing import Any, Final, NamedTuple
 
 FLOAT, INT64, DOUBLE = 1, 7, 11
 """Element types, as onnx.TensorProto numbers them."""
+OPSET: Final = 17
+IR_VERSION: Final = 8
+"""Versions of the operators and of the file format in which graphs are written."""
 NONE: Final = ""
 """Name of an input or output that is left out."""
 

@@ -30,7 +30,7 @@ class NetworkRecipe(_Part):
     """
 
     channels: Literal["raw", "residual"] = "raw"
-    window: int = Field(default=19, ge=1)
+    window: int = Field(default=19, ge=2)
     units: int = Field(default=167, ge=1)
     hidden: int = Field(default=256, ge=1)
     dropout: float = Field(default=0.5, ge=0.0, lt=1.0)

@@ -48,8 +48,6 @@ class FirFilter:
         self._buffer = Window(self.window, np.float64)
         self._residuals = WheelSpeedResiduals() if channels == "residual" else None
         self._features = np.zeros(len(CHANNELS))
-        self._magnitude = np.zeros(len(CHANNELS))
-        self._fits = np.zeros(len(CHANNELS), dtype=np.bool_)
         self.estimate = np.full(len(OUTPUTS), np.nan)
         self.deviation = np.full(len(OUTPUTS), np.nan)
 
@@ -63,7 +61,7 @@ class FirFilter:
 
         Raises SensorError naming a channel that is NaN or infinite; such a sample is not taken.
         """
-        check_sample(measured, self._magnitude, self._fits)
+        check_sample(measured)
         self._features[:] = measured
         if self._residuals is not None:
             self._features[WHEEL_SPEEDS] = self._residuals.step(measured)

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sensor.body_motion import BodyMotion, Geometry
-from sensor.channels import CHANNELS, OUTPUTS
+from sensor.channels import OUTPUTS
 from sensor.window import check_sample
 
 Array = npt.NDArray[np.float64]
@@ -17,8 +17,6 @@ class StillWheels:
 
     def __init__(self, geometry: Geometry | None = None) -> None:
         self._body = BodyMotion(geometry)
-        self._magnitude = np.zeros(len(CHANNELS))
-        self._fits = np.zeros(len(CHANNELS), dtype=np.bool_)
         self.estimate = np.full(len(OUTPUTS), np.nan)
         self.deviation = np.full(len(OUTPUTS), np.nan)
 
@@ -31,7 +29,7 @@ class StillWheels:
         """Take one sample (14,) in SI units; raises SensorError naming a channel that is NaN or
         infinite.
         """
-        check_sample(measured, self._magnitude, self._fits)
+        check_sample(measured)
         self.estimate[:] = self._body.step(measured)
         return True
 

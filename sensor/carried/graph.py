@@ -37,9 +37,10 @@ from sensor.channels import (
     SAMPLE_RATE_HZ,
 )
 from sensor.errors import SensorError
-from sensor.export import IR_VERSION, OPSET, node_of
+from sensor.export import node_of
 from sensor.features import WHEEL_SPEEDS
 from sensor.metadata import CARRIED, METADATA_KEY
+from sensor.operation import IR_VERSION, OPSET
 
 TOLERANCE = 1e-5  # m/s
 _TORCH_TO_ONNX_GATES = [0, 3, 1, 2]  # input, forget, cell, output -> input, output, forget, cell

@@ -51,9 +51,7 @@ class CarriedSensor:
             {name: np.zeros(shapes[name], dtype=np.float32) for name in STATES} for _ in range(2)
         ]
         self._bindings = [self._bind(0), self._bind(1)]
-        self._magnitude = np.zeros(len(CHANNEL_NAMES))
         self._within = np.zeros(len(CHANNEL_NAMES))
-        self._fits = np.zeros(len(CHANNEL_NAMES), dtype=np.bool_)
         self._count = 0
         self.estimate = np.full(len(OUTPUTS), np.nan)
         self.deviation = np.full(len(OUTPUTS), np.nan)
@@ -74,7 +72,7 @@ class CarriedSensor:
         Finite values beyond `LARGEST` are cut off there. Raises SensorError naming the channel if
         the sample holds a NaN or infinity; such a sample is not taken.
         """
-        check_sample(measured, self._magnitude, self._fits)
+        check_sample(measured)
         np.clip(measured, LEAST, LARGEST, out=self._within)
         self._measured[0] = self._within
         self._command[0] = command

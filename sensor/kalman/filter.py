@@ -85,8 +85,6 @@ class KalmanFilter:
         self._allocate(len(model.parts["rest"][0]), len(model.rows), length)
         self.estimate = np.full(len(OUTPUTS), np.nan)
         self.deviation = np.full(len(OUTPUTS), np.nan)
-        self._magnitude = np.zeros(len(CHANNELS))
-        self._fits = np.zeros(len(CHANNELS), dtype=np.bool_)
         self.reset()
 
     @classmethod
@@ -122,7 +120,7 @@ class KalmanFilter:
 
         Raises SensorError naming a channel that is NaN or infinite.
         """
-        check_sample(measured, self._magnitude, self._fits)
+        check_sample(measured)
         speed = abs(float(measured[_VX]))
         if not self._started:
             self._speed = self.at_speed = speed

@@ -1,0 +1,1 @@
+"""A windowed network with one step per sample: the windows in flight advance together."""
