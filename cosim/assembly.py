@@ -144,13 +144,15 @@ def assemble(
         settings = controller.sensor_of_run(scenario.sensor)
         file = estimator_file(scenario, settings)
         sensor = over_gaps(estimator_of(scenario, settings), acting)
-    sensor = late_sensor(sensor, scenario.latency)
+    latency = controller.latency_of_run(scenario.latency)
+    sensor = late_sensor(sensor, latency)
     passive = isinstance(controller, Passive) and dampers is None
     start = _start_values(scenario, description, course, plan, passive)
     block = dampers or controller_of(controller, damper_map(scenario.parameters))
     steps, if_late = _steps(scenario, plan)
     driver = plan.driver(STEP_S, friction_of(scenario))
-    recorder = Recorder(record_groups_of(scenario), steps + 1, STEP_S)
+    groups = record_groups(scenario.sensor.condition, bool(acting), latency.damper_ms > 0)
+    recorder = Recorder(groups, steps + 1, STEP_S)
     vehicle = Vehicle(description, wiring, start, STEP_S, block.command)
     files = {"fmu": description.path, "sensor": file, "road": course.file}
     files |= {f"variant {name}": path for name, path in scenario.variants.files.items()}
@@ -166,7 +168,7 @@ def assemble(
             sensor,
             block,
             fault_block(acting, scenario.seed),
-            damper_block(scenario.latency, block.command),
+            damper_block(latency, block.command),
         ),
         vehicle=vehicle,
         driver=driver,
@@ -174,12 +176,6 @@ def assemble(
         steps=steps,
         if_late=if_late,
     )
-
-
-def record_groups_of(scenario: Scenario) -> list[tuple[str, list[Signal]]]:
-    """Return the groups of the record of a scenario's run."""
-    late = scenario.latency.damper_ms > 0
-    return record_groups(scenario.sensor.condition, bool(scenario.faults), late)
 
 
 def record_groups(

@@ -253,6 +253,18 @@ def test_late_dampers_hold_older_commands(tmp_path: Path) -> None:
     assert names[0] == "Held.Car.SuspControl.DamperFL.CtrlOut"
 
 
+def test_a_run_may_have_latencies_of_its_own(tmp_path: Path) -> None:
+    controllers = (
+        "[{kind: skyhook, feedback: truth}, {kind: skyhook, feedback: truth, name: prompt,"
+        " latency: {}}, {kind: skyhook, feedback: truth, name: late, latency: {damper_ms: 10}}]"
+    )
+    outcome = run(tmp_path, faults="[]", latency="{damper_ms: 20}", controllers=controllers)
+    shared, prompt, late = (one.recorder for one in outcome.runs)
+    np.testing.assert_array_equal(shared.group("held")[2:], shared.group("command")[:-2])
+    np.testing.assert_array_equal(late.group("held")[1:], late.group("command")[:-1])
+    assert not prompt.group("held").size
+
+
 def test_speed_and_motion_in_figures_are_the_car_s_not_the_faulty_ones(tmp_path: Path) -> None:
     fault = "[{kind: bias, channels: Car.vx, value: 50 km/h}]"
     sections = {"road": "{track: straight, length_m: 60}", "manoeuvre": "{kind: constant_speed}"}

@@ -11,6 +11,7 @@ from cosim.control.add import CROSSOVER_HZ
 from cosim.control.hybrid import SKYHOOK_SHARE
 from cosim.control.modal import ModalGains
 from cosim.control.skyhook import SKYHOOK_GAIN
+from cosim.scenario.latency import Latency
 from cosim.scenario.model import NAME_PATTERN, Model, with_unit
 from cosim.scenario.sensor import EstimatorName, Sensor
 from sensor.estimators import names
@@ -30,6 +31,9 @@ class OneRun(Model):
         min_length=1,
         description="ONNX file, relative to the scenario, that takes the sensor's place",
     )
+    latency: Latency | None = Field(
+        default=None, description="latencies of this run; the scenario's if not given"
+    )
 
     @property
     def label(self) -> str:
@@ -41,6 +45,10 @@ class OneRun(Model):
         if self.estimator is None and self.network is None:
             return shared
         return Sensor(estimator=self.estimator, network=self.network, condition=shared.condition)
+
+    def latency_of_run(self, shared: Latency) -> Latency:
+        """Return the latencies of this run: its own, or the scenario's."""
+        return shared if self.latency is None else self.latency
 
     @model_validator(mode="after")
     def _not_both(self) -> OneRun:
