@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -25,27 +25,19 @@ from cosim.grip import grip_figures
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.manoeuvre import Plan, friction_of, manoeuvre_of, motion_of
 from cosim.manoeuvre.programme import ProgrammedDriver
-from cosim.quantities import (
-    CHANNEL_QUANTITIES,
-    DAMPERS,
-    DRIVER,
-    GRIP_SHARE,
-    RECORDED,
-    SEAT,
-    TRAVEL,
-    TRUTH,
-    TYRE_LOAD,
-    Quantity,
-)
-from cosim.recorder import Recorder, Signal
+from cosim.quantities import GRIP_SHARE, SEAT, TRAVEL, TYRE_LOAD, Quantity
+from cosim.realtime.clock import Clock, clock_of
+from cosim.record import record_groups_of
+from cosim.recorder import Recorder
 from cosim.scenario.controllers import Controller, Passive
 from cosim.scenario.schema import Scenario
 from cosim.sensor import estimator_file, estimator_of, measurement_of, stage_problems
 from cosim.start import builtin_start, checked_parameters
+from cosim.testbench import Testbench
 from cosim.vehicle import Vehicle, builtin_fmu
 from cosim.wiring import Wiring, mapped_wiring, own_wiring
-from sensor import CHANNELS, OUTPUTS, SAMPLE_RATE_HZ, Channel
-from sensor.conditions import PRODUCTION_PARAMETERS, Condition
+from sensor import SAMPLE_RATE_HZ
+from sensor.conditions import PRODUCTION_PARAMETERS
 
 Array = npt.NDArray[np.float64]
 
@@ -69,6 +61,7 @@ class RunResult:
     largest_deviation_m: float
     manoeuvre: Mapping[str, float]
     grip: Mapping[str, Mapping[str, float]]
+    timing: Mapping[str, Any]
 
 
 @dataclass
@@ -81,31 +74,34 @@ class Assembly:
     initial_command: Array
     files: Mapping[str, Path]
     blocks: Blocks
-    vehicle: Vehicle
+    clock: Clock
     driver: PathDriver | ProgrammedDriver
     plan: Plan
     steps: int
     if_late: str  # why the run ends where the driver has not come to the end
 
     def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
-        """Run to the end of the lap or the last step, and free the FMU whatever happens."""
-        begin = time.perf_counter()
+        """Run to the end of the lap or the last step, and let go of the bench whatever happens."""
         try:
-            last = loop.run(self.blocks, self.recorder, self.steps, progress)
+            self.blocks.vehicle.connect()
+            begin = time.perf_counter()
+            with self.clock:
+                last = loop.run(self.blocks, self.clock, self.recorder, self.steps, progress)
+            wall = time.perf_counter() - begin
         finally:
-            self.vehicle.close()
-        wall = time.perf_counter() - begin
+            self.blocks.vehicle.stop()
         done = self.driver.completed
         return RunResult(
             steps_done=last,
             wall_time_s=wall,
             simulated_s=last * STEP_S,
             lap_time_s=last * STEP_S if done else None,
-            finish_reason=self.plan.end if done else self._unfinished(),
+            finish_reason=self.clock.stopped or (self.plan.end if done else self._unfinished()),
             comfort=_comfort(self.recorder),
             largest_deviation_m=self.driver.largest_deviation,
             manoeuvre=self.plan.figures(motion_of(self.recorder)),
             grip=grip_figures(_recorded(self.recorder, GRIP_SHARE)),
+            timing=self.clock.figures(),
         )
 
     def _unfinished(self) -> str:
@@ -130,11 +126,12 @@ def assemble(
     sensor: SensorBlock | None = None,
     dampers: ControllerBlock | None = None,
     roads: Path | None = None,
+    bench: Testbench | None = None,
 ) -> Assembly:
     """Connect the blocks of `scenario` with one of its controllers.
 
-    `sensor` and `dampers` replace the scenario's own (the data set is built so), `roads` is where
-    its road is kept in place of the cache. Raises
+    `sensor` and `dampers` replace the scenario's own (the data set is built so), `bench` its FMU;
+    `roads` is where its road is kept in place of the cache. Raises
     `InputError` with everything wrong in the scenario, `FmuError` or `NetworkError` for a file that
     does not load.
     """
@@ -151,9 +148,8 @@ def assemble(
     block = dampers or controller_of(controller, damper_map(scenario.parameters))
     steps, if_late = _steps(scenario, plan)
     driver = plan.driver(STEP_S, friction_of(scenario))
-    groups = record_groups(scenario.sensor.condition, bool(acting), latency.damper_ms > 0)
-    recorder = Recorder(groups, steps + 1, STEP_S)
-    vehicle = Vehicle(description, wiring, start, STEP_S, block.command)
+    recorder = Recorder(record_groups_of(scenario, controller), steps + 1, STEP_S)
+    vehicle = bench or Vehicle(description, wiring, start, STEP_S, block.command)
     files = {"fmu": description.path, "sensor": file, "road": course.file}
     files |= {f"variant {name}": path for name, path in scenario.variants.files.items()}
     files |= {f"fault {name}": path for name, path in scenario.fault_files.items()}
@@ -170,52 +166,12 @@ def assemble(
             fault_block(acting, scenario.seed),
             damper_block(latency, block.command),
         ),
-        vehicle=vehicle,
+        clock=clock_of(scenario.real_time, STEP_S, steps + 1),
         driver=driver,
         plan=plan,
         steps=steps,
         if_late=if_late,
     )
-
-
-def record_groups(
-    condition: Condition = "ideal", faults: bool = False, late_dampers: bool = False
-) -> list[tuple[str, list[Signal]]]:
-    """Return the groups of the record, in the order of the loop. The channels are those that the
-    sensor gets; the ideal ones, those measured, and the commands that the dampers hold follow where
-    they differ.
-    """
-
-    def signals(quantities: tuple[Quantity, ...]) -> list[Signal]:
-        return [Signal(q.name, q.unit if q.unit != "1" else "", q.description) for q in quantities]
-
-    def other(name: str, what: str, there: bool) -> list[Signal]:
-        made = (Signal(f"{name}.{c.name}", c.unit, f"{c.description}, {what}") for c in CHANNELS)
-        return list(made) if there else []
-
-    held = [Signal(f"Held.{q.name}", "", f"{q.description}, as it arrives") for q in DAMPERS]
-    return [
-        ("channels", signals(CHANNEL_QUANTITIES)),
-        ("estimate", [Signal(o.name, o.unit, o.description) for o in OUTPUTS]),
-        ("deviation", [_deviation(o) for o in OUTPUTS]),
-        ("valid", [Signal("VRel.Valid", "", "1 where the estimate is valid")]),
-        ("truth", signals(TRUTH)),
-        ("command", signals(DAMPERS)),
-        ("driver", signals(DRIVER)),
-        ("vehicle", signals(RECORDED)),
-        ("ideal", other("Ideal", "exactly", condition != "ideal")),
-        ("measured", other("Measured", "as the car measured it", faults)),
-        ("held", held if late_dampers else []),
-    ]
-
-
-def _deviation(output: Channel) -> Signal:
-    """Return the signal of an output's predicted standard deviation."""
-    wheel = output.name.split(".")[1]
-    about = (
-        f"standard deviation of the error that the sensor expects {wheel}, NaN if it expects none"
-    )
-    return Signal(f"VRel.Deviation.{wheel}", output.unit, about)
 
 
 def checked_parts(
@@ -311,4 +267,4 @@ def _recorded(recorder: Recorder, quantities: Sequence[Quantity]) -> Array:
     return recorder.columns([quantity.name for quantity in quantities])
 
 
-__all__ = ["Assembly", "RunResult", "assemble", "checked_parts", "record_groups"]
+__all__ = ["Assembly", "RunResult", "assemble", "checked_parts"]

@@ -25,7 +25,19 @@ def main() -> None:
     """Drive a vehicle FMU over a road and compare a virtual suspension sensor with the truth."""
 
 
-@main.command()
+class RealTimeCommand(click.Command):
+    """A command whose `--real-time` takes a factor after an equals sign only: what follows it is
+    the next argument.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse as ever, a bare --real-time as a factor of 1."""
+        return super().parse_args(
+            ctx, ["--real-time=1" if word == "--real-time" else word for word in args]
+        )
+
+
+@main.command(cls=RealTimeCommand)
 @click.argument("scenarios", metavar="SCENARIO...", nargs=-1, required=True)
 @click.option(
     "--json",
@@ -53,6 +65,11 @@ def main() -> None:
     type=click.IntRange(1),
     help="Run up to N scenarios at the same time, as many as there are cores by default.",
 )
+@click.option(
+    "--real-time",
+    metavar="[=FACTOR]",
+    help="Go by the clock, FACTOR simulated seconds in one of its seconds, 1 by default.",
+)
 def run(
     scenarios: tuple[str, ...],
     as_json: bool,
@@ -60,6 +77,7 @@ def run(
     output_dir: Path | None,
     overrides: tuple[str, ...],
     jobs: int | None,
+    real_time: str | None,
 ) -> None:
     """Run each SCENARIO, a YAML file or a folder of them, and write the results.
 
@@ -69,6 +87,8 @@ def run(
     labelled = [(text, f"--set {text}") for text in overrides]
     if duration is not None:
         labelled.append((f"duration={duration}", f"--duration {duration}"))
+    if real_time is not None:
+        labelled.append((f"real_time.factor={real_time}", f"--real-time={real_time}"))
     one_thread()
     with failures_as_exit_codes():
         if len(scenarios) == 1 and not Path(scenarios[0]).is_dir():

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from cosim.driver_model import DriverModel
 from cosim.road import Track
-from cosim.vehicle import State
+from cosim.testbench import State
 
 Array = npt.NDArray[np.float64]
 

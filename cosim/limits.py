@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from cosim.errors import did_you_mean
-from cosim.metrics import MANOEUVRE_FIGURES, figure, metric_names, with_unit
+from cosim.metrics import LATENESS, MANOEUVRE_FIGURES, figure, metric_names, with_unit
 
 
 class Bounds(Protocol):
@@ -28,6 +28,9 @@ class Bounds(Protocol):
     @property
     def surface(self) -> str | None:
         """The only surface that it counts on; None for all."""
+
+
+L = TypeVar("L", bound=Bounds)
 
 
 @dataclass(frozen=True)
@@ -91,9 +94,31 @@ def _kinds_of(metric: str, labels: Sequence[str]) -> str:
     return " or ".join(kinds) if name != metric else ""
 
 
-def on_surface(limits: Iterable[Bounds], surface: str | None) -> list[Bounds]:
-    """Return the limits that count on a surface; None stands for a road file's own."""
-    return [limit for limit in limits if limit.surface in (None, surface)]
+def counted(
+    limits: Sequence[L], surface: str | None, real_time: object | None
+) -> tuple[list[L], tuple[str, ...]]:
+    """Return the limits that count on a surface (None stands for a road file's own) and with or
+    without real time, and a note on each kind that is left out.
+    """
+    here = [limit for limit in limits if limit.surface in (None, surface)]
+    others = [limit for limit in limits if limit not in here]
+    late = [limit for limit in here if real_time is None and _is_lateness(limit.metric)]
+    notes = []
+    if others:
+        names = ", ".join(sorted({str(limit.surface) for limit in others}))
+        word = "another surface" if len(others) == 1 else "other surfaces"
+        notes.append(f"{_number(others)} for {word} ({names}) and left out on {surface}")
+    if late:
+        notes.append(f"{_number(late)} for runs in real time and left out")
+    return [limit for limit in here if limit not in late], tuple(notes)
+
+
+def _is_lateness(metric: str) -> bool:
+    return any(metric.endswith(f"timing.{name}") for name in LATENESS)
+
+
+def _number(limits: Sequence[object]) -> str:
+    return "1 limit is" if len(limits) == 1 else f"{len(limits)} limits are"
 
 
 def evaluate(limits: Iterable[Bounds], runs: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:

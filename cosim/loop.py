@@ -18,25 +18,12 @@ from cosim.control.sample import Sample
 from cosim.faults.latency import PromptDampers
 from cosim.faults.stack import NoFaults
 from cosim.recorder import Recorder
-from cosim.vehicle import State
+from cosim.testbench import State, Testbench
 
 Array = npt.NDArray[np.float64]
 
 PROGRESS_STEPS = 50
 NOTHING = np.zeros(0)  # recorded in the place of what is the same as another group
-
-
-class VehicleBlock(Protocol):
-    """Steps a car and reads its outputs."""
-
-    def read(self) -> State:
-        """Return the outputs at the present time."""
-
-    def step(self, k: int, driver_command: Array, damper_command: Array) -> None:
-        """Hold both commands over [t_k, t_k+1]."""
-
-    def check_finite(self, k: int) -> None:
-        """Raise `FmuError` if an output that was read is no number."""
 
 
 class DriverBlock(Protocol):
@@ -102,11 +89,18 @@ class DamperBlock(Protocol):
         """
 
 
+class ClockBlock(Protocol):
+    """Decides when a sample is due."""
+
+    def wait(self, k: int) -> bool:
+        """Return when sample k is due, at once where nothing goes by the clock; False to stop."""
+
+
 @dataclass(frozen=True)
 class Blocks:
     """The four roles; measurement and faults between vehicle and sensor; the way to the dampers."""
 
-    vehicle: VehicleBlock
+    vehicle: Testbench
     driver: DriverBlock
     measurement: MeasurementBlock
     sensor: SensorBlock
@@ -117,11 +111,13 @@ class Blocks:
 
 def run(
     blocks: Blocks,
+    clock: ClockBlock,
     recorder: Recorder,
     steps: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
-    """Run until the driver has finished, at most `steps` steps; return the number of the last row.
+    """Run until the driver has finished or the clock stops, at most `steps` steps; return the
+    number of the last row.
 
     Whatever raises on the way leaves the rows before it in the recorder.
     """
@@ -131,8 +127,9 @@ def run(
     command = controller.command  # the vehicle stands at t_0 with the initial one
     sample = Sample()
     for k in range(steps + 1):
+        if not clock.wait(k):  # in real time: until t_k
+            return k - 1
         state = vehicle.read()  # vehicle -> outputs at t_k
-        vehicle.check_finite(k)
         measured = measurement.step(state.channels, state.stage)  # outputs -> channels of a car
         given = faults.step(k, measured)  # channels of a car -> what arrives of them
         valid = sensor.step(given, command)  # channels -> estimates, or invalid
@@ -149,5 +146,6 @@ def run(
             progress(k, steps)
         if k == steps or driver.finished:
             break
-        vehicle.step(k, pedals, held)  # hold both over [t_k, t_k+1]
+        vehicle.write(pedals, held)  # to be held over [t_k, t_k+1]
+        vehicle.step(k)
     return k

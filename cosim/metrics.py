@@ -40,6 +40,9 @@ RUN_FIGURES: Final = (
 FAULT_PARTS: Final = ("before", "during", "after")
 """Parts of the run that the figures of a fault are of; `after` is 5 s long."""
 FAULT_FIGURES: Final = ("rmse_m_s", "valid_percent", "covered_percent")
+STEP_TIMES: Final = ("step_p50_ms", "step_p99_ms", "step_max_ms")
+LATENESS: Final = ("lateness_p50_ms", "lateness_p99_ms", "lateness_max_ms", "overruns")
+"""Figures of runs in real time, and of no other."""
 _HELD: Final = ("speed_mean_kmh", "speed_deviation_kmh", "path_deviation_m")
 _LARGEST: Final = ("path_deviation_m", "lateral_acceleration_max_m_s2", "yaw_rate_max_deg_s")
 _CHANGE: Final = ("start_speed_kmh", "time_s", "distance_m", "path_deviation_m", "yaw_change_deg")
@@ -88,6 +91,7 @@ UNITS: Final = {
     "_percent": "%",
     "_deg": "°",
     "_kmh": "km/h",
+    "_ms": "ms",
     "_s": "s",
     "_n": "N",
     "_m": "m",
@@ -120,6 +124,7 @@ def metric_names(
     ]
     names += [f"comfort.{figure}" for figure in COMFORT_FIGURES]
     names += [f"grip.{wheel}.{figure}" for wheel in WHEELS for figure in GRIP_FIGURES]
+    names += [f"timing.{figure}" for figure in (*STEP_TIMES, *LATENESS)]
     names += [f"manoeuvre.{figure}" for figure in MANOEUVRE_FIGURES.get(manoeuvre or "", ())]
     names += [
         f"faults.{f}.{part}.{n}" for f in faults for part in FAULT_PARTS for n in FAULT_FIGURES

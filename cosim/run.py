@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from cosim.errors import InputError, NetworkError
-from cosim.limits import Bounds, Verdict, evaluate, on_surface
+from cosim.limits import Verdict, counted, evaluate
 from cosim.recorder import Recorder, require_parquet
 from cosim.scenario.controllers import Controller
 from cosim.scenario.paper_row import row_of
@@ -75,6 +75,10 @@ class RunResult(Protocol):
     @property
     def grip(self) -> Mapping[str, Any]:
         """Figures of `cosim.metrics.GRIP_FIGURES` by wheel; empty where the vehicle has none."""
+
+    @property
+    def timing(self) -> Mapping[str, Any]:
+        """What the machine took: `cosim.metrics.STEP_TIMES`, in real time `LATENESS` too."""
 
 
 class Assembly(Protocol):
@@ -235,6 +239,7 @@ def _run(
         "comfort": dict(result.comfort),
         "manoeuvre": dict(result.manoeuvre),
         "grip": dict(result.grip),
+        "timing": dict(result.timing),
     }
     return RunOutcome(label, assembly.recorder, figures)
 
@@ -243,7 +248,7 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
     from cosim.compare import paper_figures
 
     figures = {run.label: run.figures for run in runs}
-    limits = on_surface(scenario.limits, scenario.road.surface_name)
+    limits, notes = counted(scenario.limits, scenario.road.surface_name, scenario.real_time)
     verdicts = (*evaluate(limits, figures), *_unfinished(scenario, figures))
     metrics = finite(
         {
@@ -255,8 +260,7 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
         }
     )
     _write_json(output_dir / "metrics.json", metrics)
-    notes = (*_left_out(scenario, limits), *_idle(scenario, runs))
-    return Outcome(scenario, output_dir, runs, verdicts, metrics, notes)
+    return Outcome(scenario, output_dir, runs, verdicts, metrics, (*notes, *_idle(scenario, runs)))
 
 
 def _idle(scenario: Scenario, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
@@ -267,26 +271,19 @@ def _idle(scenario: Scenario, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
     return tuple(idle(scenario.acting_faults, longest.rows, longest.step_s))
 
 
-def _left_out(scenario: Scenario, counted: Sequence[Bounds]) -> tuple[str, ...]:
-    """Return a note on the limits that are made for other surfaces than this one."""
-    left = len(scenario.limits) - len(counted)
-    if not left:
-        return ()
-    what = "1 limit is" if left == 1 else f"{left} limits are"
-    others = {limit.surface for limit in scenario.limits if limit not in counted}
-    names = ", ".join(sorted(str(name) for name in others))
-    return (f"{what} for another surface ({names}) and left out on {scenario.road.surface_name}",)
-
-
 def _unfinished(scenario: Scenario, figures: Mapping[str, Any]) -> list[Verdict]:
-    """Return a failure for each lap that did not come to its end, whatever the limits are."""
-    if scenario.duration != "lap":
-        return []
-    return [
-        Verdict(label, "lap_time_s", None, 0.0, None, False)
-        for label, run in figures.items()
-        if run["lap_time_s"] is None
-    ]
+    """Return a failure for each run that an overrun stopped, and for each lap that did not come to
+    its end, whatever the limits are.
+    """
+    failed = []
+    stops = scenario.real_time is not None and scenario.real_time.overrun == "stop"
+    for label, run in figures.items():
+        overruns = run["timing"].get("overruns")
+        if stops and overruns:
+            failed.append(Verdict(label, "timing.overruns", overruns, None, 0.0, False))
+        elif scenario.duration == "lap" and run["lap_time_s"] is None:
+            failed.append(Verdict(label, "lap_time_s", None, 0.0, None, False))
+    return failed
 
 
 def _report(outcome: Outcome, versions: Mapping[str, Any]) -> Outcome:

@@ -117,7 +117,7 @@ def outcome(shown: Outcome) -> None:
     failed = sum(not verdict.passed for verdict in shown.verdicts)
     count = len(shown.verdicts)
     verdict = f"{failed} of {count} limits FAILED" if failed else f"all {count} limits hold"
-    none = "no limits for this surface" if shown.scenario.limits else "no limits set"
+    none = "no limits that count here" if shown.scenario.limits else "no limits set"
     summary = verdict if count else none
     click.echo(f"{summary}; results in {shown.output_dir}", err=True)
 
@@ -144,7 +144,7 @@ def problems(ended: Sequence[Ended]) -> None:
     for one in ended:
         file = str(one.job.scenario)
         for problem in one.problems:
-            named = problem.startswith((file, "--set ", "--duration "))
+            named = problem.startswith((file, "--set ", "--duration ", "--real-time="))
             said[problem if named else f"{file}: {problem}"] = None
     for words in said:
         click.echo(f"error: {words}", err=True)

@@ -1,10 +1,9 @@
-"""The vehicle block: a co-simulation FMU behind `read` and `step`."""
+"""The vehicle block: a co-simulation FMU as a test bench."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
@@ -14,15 +13,12 @@ import numpy.typing as npt
 from cosim.errors import FmuError
 from cosim.fmi import Description, Slave, Value
 from cosim.quantities import (
-    CHANNEL_QUANTITIES,
     DAMPERS,
     DRIVER,
-    POSE,
-    RECORDED,
-    SENSOR_STAGE,
-    TRUTH,
+    OUTPUT_QUANTITIES,
     Quantity,
 )
+from cosim.testbench import State
 from cosim.wiring import Wire, Wiring
 
 Array = npt.NDArray[np.float64]
@@ -36,28 +32,12 @@ def builtin_fmu(fmi_version: int = 3) -> Path:
     return path
 
 
-@dataclass(frozen=True)
-class State:
-    """The vehicle's outputs at t_k in SI units; views of one buffer that `Vehicle.read` refills.
-
-    channels (14,), truth (4,) [m/s, positive in extension], pose (3,) [m, m, rad],
-    recorded (all beside channels and truth, in the order of `RECORDED`), stage (11,) what
-    production sensors deliver (`sensor.STAGE`); NaN where the FMU has none.
-    """
-
-    channels: Array
-    truth: Array
-    pose: Array
-    recorded: Array
-    stage: Array
-
-
 class Vehicle:
-    """A vehicle FMU, initialised and ready to be stepped.
+    """A vehicle FMU as a test bench.
 
     `wiring` says which variable carries which quantity; `start_values` are in the FMU's own names
-    and units. Raises `FmuError` with the FMU's own words, or naming the variable that is not a
-    number.
+    and units. Every failing call raises `FmuError` with the FMU's own words, or naming the variable
+    that is not a number.
     """
 
     def __init__(
@@ -69,53 +49,63 @@ class Vehicle:
         initial_command: Array | float = 0.0,
     ) -> None:
         self.step_s = step_s
-        self._slave = Slave(
-            description, [w.variable for w in wiring.inputs], [w.variable for w in wiring.outputs]
-        )
-        self._values = np.full(len(CHANNEL_QUANTITIES) + len(TRUTH) + len(RECORDED), np.nan)
+        self._description, self._wiring = description, wiring
+        self._start_values = dict(start_values)
+        self._initial_command = np.full(len(DAMPERS), initial_command)
+        self._k, self._connected = 0, False
+        self._values = np.full(len(OUTPUT_QUANTITIES), np.nan)
+        self._state = State.over(self._values)
         self._prepare_outputs(wiring.outputs)
-        self._prepare_inputs(wiring.inputs)
-        n, m = len(CHANNEL_QUANTITIES), len(CHANNEL_QUANTITIES) + len(TRUTH)
-        recorded = self._values[m:]
-        stage = RECORDED.index(SENSOR_STAGE[0])
-        self._state = State(
-            channels=self._values[:n],
-            truth=self._values[n:m],
-            pose=recorded[: len(POSE)],
-            recorded=recorded,
-            stage=recorded[stage : stage + len(SENSOR_STAGE)],
+
+    def connect(self) -> None:
+        """Load the FMU and initialise it at t = 0, the dampers at the initial command."""
+        wiring = self._wiring
+        self._slave = Slave(
+            self._description,
+            [w.variable for w in wiring.inputs],
+            [w.variable for w in wiring.outputs],
         )
-        self._commands[len(DRIVER) :] = initial_command
-        self._hold()
+        self._prepare_inputs(wiring.inputs)
+        self._k, self._connected = 0, True
+        self.write(np.zeros(len(DRIVER)), self._initial_command)
         try:
-            self._slave.initialise(dict(start_values))
+            self._slave.initialise(self._start_values)
         except FmuError:
-            self._slave.close()
+            self.stop()
             raise
 
     def read(self) -> State:
         """Return the outputs at the present time; the same object every time, refilled."""
         slave, values = self._slave, self._values
         slave.read()
+        self._check_finite(slave.outputs)
         if self._identity:
             np.multiply(slave.outputs, self._factor, out=values)
         else:
             values[self._place] = slave.outputs * self._factor + self._offset
         return self._state
 
-    def step(self, k: int, driver_command: Array, damper_command: Array) -> None:
-        """Hold both commands over [t_k, t_k+1]: (3,) steer [rad], gas, brake; (4,) dampers 0..1."""
+    def write(self, driver_command: Array, damper_command: Array) -> None:
+        """Hold both commands from now on: (3,) steer [rad], gas, brake; (4,) dampers 0..1."""
         commands = self._commands
         commands[: len(DRIVER)] = driver_command
         commands[len(DRIVER) :] = damper_command
         self._hold()
-        self._slave.step(k, self.step_s)
 
-    def check_finite(self, k: int) -> None:
+    def step(self, k: int) -> None:
+        """Go from t_k to t_k+1."""
+        self._slave.step(k, self.step_s)
+        self._k = k + 1
+
+    def stop(self) -> None:
+        """Free the FMU; may be called twice, and without `connect`."""
+        if self._connected:
+            self._slave.close()
+
+    def _check_finite(self, outputs: Array) -> None:
         """Raise `FmuError` naming the first output that is not a number, the time and the last
         inputs.
         """
-        outputs = self._slave.outputs
         if math.isfinite(outputs.dot(outputs)):  # one call; a huge but finite value is found below
             return
         for name, value in zip(self._slave.output_names, outputs, strict=True):
@@ -126,12 +116,8 @@ class Vehicle:
                 )
                 raise FmuError(
                     f"{self._slave.description.path.name}: {name} is {value} at "
-                    f"t = {k * self.step_s:.6g} s; the last inputs were {held}"
+                    f"t = {self._k * self.step_s:.6g} s; the last inputs were {held}"
                 )
-
-    def close(self) -> None:
-        """Free the FMU; may be called twice."""
-        self._slave.close()
 
     def _hold(self) -> None:
         inputs = self._slave.inputs
@@ -142,9 +128,7 @@ class Vehicle:
         np.divide(inputs, self._input_factor, out=inputs)
 
     def _prepare_outputs(self, wires: tuple[Wire, ...]) -> None:
-        order: dict[Quantity, int] = {
-            q: i for i, q in enumerate((*CHANNEL_QUANTITIES, *TRUTH, *RECORDED))
-        }
+        order: dict[Quantity, int] = {q: i for i, q in enumerate(OUTPUT_QUANTITIES)}
         self._place = np.array([order[w.quantity] for w in wires])
         self._factor = np.array([w.factor for w in wires])
         self._offset = np.array([w.offset for w in wires])

@@ -10,9 +10,10 @@ import pytest
 from foreign_fmu import ECHO, Variable, own_variables, parrot
 from loop_rig import Blind, Guess, write_scenario
 
-from cosim.assembly import Assembly, assemble, record_groups
+from cosim.assembly import Assembly, assemble
 from cosim.control.fixed import FixedDampers
 from cosim.errors import InputError, NetworkError
+from cosim.record import record_groups
 from cosim.road import Smooth, build_road, load_track
 from cosim.scenario.load import load
 from sensor.channels import PASSIVE_COMMAND
@@ -31,7 +32,7 @@ def assembled(
 def build(folder: Path, duration: str = SHORT, **sections: str) -> Assembly:
     """The blocks of a short run, its FMU already freed."""
     built = assembled(folder, duration, sections)
-    built.vehicle.close()
+    built.blocks.vehicle.stop()
     return built
 
 

@@ -18,7 +18,7 @@ from cosim.cli import main
 from cosim.errors import InputError
 from cosim.tables import batch_table
 
-TIMES = ("wall_time_s", "real_time_factor")  # of metrics.json: how long the machine took
+TIMES = ("wall_time_s", "real_time_factor", "timing")  # of metrics.json: how long the machine took
 PASSES = "[{metric: largest_deviation_m, max: 1}]"
 FAILS = "[{metric: sensor.overall.rmse_m_s, max: 1e-9}]"
 CLOSED_LOOP = "[{kind: passive}, {kind: skyhook, feedback: truth}]"

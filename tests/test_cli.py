@@ -74,7 +74,7 @@ def test_limits_for_another_surface_are_left_out_and_said(cosim):
     result = cosim("lap.yaml", "--set", limits)
     assert result.exit_code == 0
     assert "note: 1 limit is for another surface (A) and left out on smooth" in result.stderr
-    assert "no limits for this surface" in result.stderr
+    assert "no limits that count here" in result.stderr
     assert "left out on smooth" in Path("results/lap/report.html").read_text()
     result = cosim("lap.yaml", "--set", limits, "--set", "road.surface=A")
     assert result.exit_code == 1

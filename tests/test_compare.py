@@ -6,7 +6,7 @@ import pytest
 from stand_in_assembly import GROUPS, WINDOW, StandIn
 
 from cosim.compare import compare, paper_figures
-from cosim.limits import check_metric, evaluate, on_surface
+from cosim.limits import check_metric, counted, evaluate
 from cosim.metrics import (
     COMFORT_FIGURES,
     ERROR_FIGURES,
@@ -111,9 +111,9 @@ def test_limits(limit, passed):
 
 def test_a_limit_counts_on_its_own_surface_only():
     limits = [Limit(metric="x", max=1), *(Limit(metric="x", max=1, surface=s) for s in "AB")]
-    counted = {s: on_surface(limits, s) for s in ("smooth", "A", None)}
-    assert {s: len(found) for s, found in counted.items()} == {"smooth": 1, "A": 2, None: 1}
-    verdict = evaluate(counted["A"], {"passive": {"x": 2.0}})[1]
+    found = {s: counted(limits, s, None)[0] for s in ("smooth", "A", None)}
+    assert {s: len(kept) for s, kept in found.items()} == {"smooth": 1, "A": 2, None: 1}
+    verdict = evaluate(found["A"], {"passive": {"x": 2.0}})[1]
     assert (verdict.passed, verdict.required) == (False, "at most 1 (surface A)")
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 from loop_rig import Blind
 
-from cosim.assembly import STEP_S, record_groups
+from cosim.assembly import STEP_S
 from cosim.control.fixed import FixedDampers
 from cosim.driver import PathDriver
 from cosim.driver_model import DriverModel
@@ -22,13 +22,16 @@ from cosim.loop import Blocks
 from cosim.loop import run as run_loop
 from cosim.manoeuvre.line import deviation
 from cosim.manoeuvre.motion import motion_of
+from cosim.realtime.clock import Clock
+from cosim.record import record_groups
 from cosim.recorder import Recorder
 from cosim.road import Smooth, Stop, Track, build_road, load_track
 from cosim.road.circle import load_circle
 from cosim.road.elements import Arc, Straight
 from cosim.road.track import Knots, Layout, build_track
 from cosim.speed_profile import STYLES, Style, speed_profile, travel_time
-from cosim.vehicle import State, Vehicle, builtin_fmu
+from cosim.testbench import State
+from cosim.vehicle import Vehicle, builtin_fmu
 from cosim.wiring import own_wiring
 from sensor.conditions import Measurement
 
@@ -285,10 +288,11 @@ def drive(
     steps = round(1.3 * expected / STEP_S)
     recorder = Recorder(record_groups(), steps + 1, STEP_S)
     try:
+        vehicle.connect()
         blocks = Blocks(vehicle, driver, Measurement("ideal", 1), Blind(), FixedDampers())
-        run_loop(blocks, recorder, steps)
+        run_loop(blocks, Clock(steps + 1), recorder, steps)
     finally:
-        vehicle.close()
+        vehicle.stop()
     return Drive(expected, driver.finished, driver.largest_deviation, recorder)
 
 

@@ -145,7 +145,7 @@ def test_a_vehicle_without_sensor_signals_is_named(tmp_path: Path) -> None:
     built: Assembly = assemble(
         load(scenario.file, ["sensor.condition=ideal"]), scenario.controllers[0], Guess()
     )
-    built.vehicle.close()
+    built.blocks.vehicle.stop()
 
 
 def test_inspect_shows_the_sensor(tmp_path: Path) -> None:

@@ -124,7 +124,7 @@ def test_a_file_of_ones_own(tmp_path: Path) -> None:
     scenario = with_variants(tmp_path, "mine.yaml", "worn_dampers")
     assert scenario.parameters["Body.Mass"] == 2600
     built = assemble(scenario, scenario.controllers[0], sensor=Blind())
-    built.vehicle.close()
+    built.blocks.vehicle.stop()
     assert built.files["variant mine"] == (tmp_path / "mine.yaml").resolve()
 
 

@@ -31,14 +31,19 @@ STANDING = np.zeros(3), np.zeros(4)
 
 
 def builtin(start: dict[str, Value] | None = None, version: int = 3) -> Vehicle:
-    return Vehicle(Description(builtin_fmu(version)), own_wiring(), start or {}, H)
+    return connected(Vehicle(Description(builtin_fmu(version)), own_wiring(), start or {}, H))
+
+
+def connected(vehicle: Vehicle) -> Vehicle:
+    vehicle.connect()
+    return vehicle
 
 
 def told(folder: Path, **orders: float) -> Vehicle:
     """A parrot with these orders (see tests/parrot_fmu)."""
     path = parrot(folder / "parrot.fmu")
     start: dict[str, Value] = {f"Parrot.{name}": value for name, value in orders.items()}
-    return Vehicle(Description(path), own_wiring(), start, H)
+    return connected(Vehicle(Description(path), own_wiring(), start, H))
 
 
 def echoing(folder: Path, initial_command: float = 0.0, damper_unit: str = "1") -> Vehicle:
@@ -50,7 +55,7 @@ def echoing(folder: Path, initial_command: float = 0.0, damper_unit: str = "1") 
     mapping = {CHANNEL_QUANTITIES[i].name: Map(f"Echo.{i}") for i in range(7)}
     wiring, problems = mapped_wiring(Description(path), mapping, report)
     assert not problems
-    return Vehicle(Description(path), wiring, {}, H, initial_command)
+    return connected(Vehicle(Description(path), wiring, {}, H, initial_command))
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -64,7 +69,7 @@ def test_the_car_starts_where_and_as_fast_as_it_is_told(version: int) -> None:
     assert state.channels[6] == pytest.approx(20.0)
     assert state.channels[9:13] == pytest.approx(np.full(4, 20.0), rel=0.05)
     np.testing.assert_allclose(state.truth, 0.0, atol=1e-9)
-    vehicle.close()
+    vehicle.stop()
 
 
 def test_shapes_and_order_of_the_state(tmp_path: Path) -> None:
@@ -78,34 +83,36 @@ def test_shapes_and_order_of_the_state(tmp_path: Path) -> None:
     assert state.recorded.tolist() == said[m:]
     assert len(state.recorded) == len(RECORDED)
     assert RECORDED[: len(POSE)] == POSE
-    vehicle.close()
+    vehicle.stop()
 
 
 def test_one_state_is_refilled_at_every_sample(tmp_path: Path) -> None:
     vehicle = told(tmp_path)
     state = vehicle.read()
     first = state.channels.copy()
-    vehicle.step(0, *STANDING)
+    vehicle.write(*STANDING)
+    vehicle.step(0)
     np.testing.assert_array_equal(state.channels, first)  # not before it is read
     assert vehicle.read() is state
     np.testing.assert_array_equal(state.channels, first + 1)
-    vehicle.close()
+    vehicle.stop()
 
 
 def test_commands_are_held_as_they_were_given(tmp_path: Path) -> None:
     vehicle = echoing(tmp_path)
     driver, dampers = np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6, 0.7])
-    vehicle.step(0, driver, dampers)
+    vehicle.write(driver, dampers)
+    vehicle.step(0)
     driver[:], dampers[:] = 9.0, 9.0
     assert vehicle.read().channels[:7].tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
-    vehicle.close()
+    vehicle.stop()
 
 
 @pytest.mark.parametrize(("unit", "told"), [("1", 0.25), ("%", 25.0), ("% lifted", 75.0)])
 def test_dampers_begin_with_the_initial_command(tmp_path: Path, unit: str, told: float) -> None:
     vehicle = echoing(tmp_path, initial_command=0.25, damper_unit=unit)
     assert vehicle.read().channels[:7].tolist() == pytest.approx([0.0] * 3 + [told] * 4)
-    vehicle.close()
+    vehicle.stop()
 
 
 def test_a_number_that_is_none_is_named_with_time_and_last_inputs(tmp_path: Path) -> None:
@@ -113,24 +120,24 @@ def test_a_number_that_is_none_is_named_with_time_and_last_inputs(tmp_path: Path
     vehicle = told(tmp_path, BadAt=3, BadOutput=102)
     for k in range(3):
         vehicle.read()
-        vehicle.check_finite(k)
-        vehicle.step(k, np.array([0.1, 0.25 * k, 0.0]), np.full(4, 0.5))
-    vehicle.read()
+        vehicle.write(np.array([0.1, 0.25 * k, 0.0]), np.full(4, 0.5))
+        vehicle.step(k)
     with pytest.raises(FmuError) as caught:
-        vehicle.check_finite(3)
+        vehicle.read()
     message = str(caught.value)
     assert message.startswith("parrot.fmu: Car.az is nan at t = 0.03 s; the last inputs were ")
     assert "DM.Steer.Ang = 0.1, DM.Gas = 0.5, DM.Brake = 0" in message
     assert "Car.SuspControl.DamperRR.CtrlOut = 0.5" in message
-    vehicle.close()
+    vehicle.stop()
 
 
 def test_infinities_of_both_signs(tmp_path: Path) -> None:
     vehicle = told(tmp_path, BadAt=1, BadOutput=102, BadValue=1)
-    vehicle.step(0, *STANDING)
-    vehicle.read()
+    vehicle.write(*STANDING)
+    vehicle.step(0)
     with pytest.raises(FmuError, match=r"Car\.az is inf at t = 0\.01 s"):
-        vehicle.check_finite(1)
+        vehicle.read()
+    vehicle.stop()
 
 
 def test_a_missing_road_file_is_named_in_the_fmus_own_words(tmp_path: Path) -> None:
@@ -154,9 +161,10 @@ def test_parameters_that_only_the_fmu_can_judge(version: int) -> None:
 
 def test_a_command_that_is_no_number_is_named() -> None:
     vehicle = builtin()
+    vehicle.write(np.array([0.0, np.nan, 0.0]), np.zeros(4))
     with pytest.raises(FmuError, match=r"could not .*DM\.Gas cannot be set to nan"):
-        vehicle.step(0, np.array([0.0, np.nan, 0.0]), np.zeros(4))
-    vehicle.close()
+        vehicle.step(0)
+    vehicle.stop()
 
 
 def test_a_vehicle_that_does_not_start_leaves_nothing_behind(
@@ -170,9 +178,10 @@ def test_a_vehicle_that_does_not_start_leaves_nothing_behind(
     assert not list(scratch.iterdir())
     vehicle = builtin()
     assert list(scratch.iterdir())
-    vehicle.close()
-    vehicle.close()
+    vehicle.stop()
+    vehicle.stop()
     assert not list(scratch.iterdir())
+    Vehicle(Description(builtin_fmu()), own_wiring(), {}, H).stop()  # which never was connected
 
 
 def test_an_fmu_that_was_never_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,8 +197,9 @@ def test_a_friction_given_as_a_start_value_lasts() -> None:
     for friction in (1.0, 0.1):
         vehicle = builtin({"Road.Friction": friction, "Init.Velocity": 20.0})
         for k in range(100):
-            vehicle.step(k, np.array([0.0, 0.0, 0.6]), np.zeros(4))
+            vehicle.write(np.array([0.0, 0.0, 0.6]), np.zeros(4))
+            vehicle.step(k)
         slowing[friction] = 20.0 - float(vehicle.read().channels[6])
-        vehicle.close()
+        vehicle.stop()
     assert slowing[0.1] < 0.12 * 9.81  # within one second, some drag included
     assert slowing[1.0] > 4.0

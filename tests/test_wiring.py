@@ -89,6 +89,7 @@ def test_outputs_are_converted_by_the_fmus_own_definitions(version: int, tmp_pat
     wiring, problems = wire(fmu)
     assert not problems
     vehicle = Vehicle(Description(fmu), wiring, {}, 0.01)
+    vehicle.connect()
     state = vehicle.read()
     said = {q.name: i + 1.0 for i, q in enumerate(OUTPUT_QUANTITIES)}  # see parrot.c
     channels = dict(zip((q.name for q in CHANNEL_QUANTITIES), state.channels, strict=True))
@@ -98,7 +99,7 @@ def test_outputs_are_converted_by_the_fmus_own_definitions(version: int, tmp_pat
     assert channels["Car.ay"] == said["Car.ay"]  # untouched
     assert state.pose[0] == said["Car.tx"] + 250.0
     assert state.truth.tolist() == [-said[q.name] for q in TRUTH]
-    vehicle.close()
+    vehicle.stop()
 
 
 def test_inputs_are_converted_the_other_way_round(version: int, tmp_path: Path) -> None:
@@ -116,12 +117,14 @@ def test_inputs_are_converted_the_other_way_round(version: int, tmp_path: Path) 
     wiring, problems = wire(fmu, {channels[i]: Map(f"Echo.{i}") for i in range(7)})
     assert not problems
     vehicle = Vehicle(Description(fmu), wiring, {}, 0.01)
+    vehicle.connect()
     commands = np.array([0.1, 0.25, 0.5]), np.array([0.1, 0.2, 0.3, 0.4])
-    vehicle.step(0, *commands)
+    vehicle.write(*commands)
+    vehicle.step(0)
     arrived = vehicle.read().channels[:7].tolist()
     # 0.5 is what 100 % lifted means: 0.01 * 100 - 0.5
     assert arrived == pytest.approx([math.degrees(0.1), 25.0, 100.0, 0.1, 0.2, 0.3, 0.4])
-    vehicle.close()
+    vehicle.stop()
 
 
 def test_a_map_gives_names_and_signs(version: int, tmp_path: Path) -> None:
@@ -170,12 +173,14 @@ def test_what_is_not_required_may_be_missing(version: int, tmp_path: Path) -> No
     wired = {w.quantity.name for w in (*wiring.outputs, *wiring.inputs)}
     assert wired == {q.name for q in QUANTITIES.values() if q.required}
     vehicle = Vehicle(Description(fmu), wiring, {}, 0.01)
+    vehicle.connect()
     state = vehicle.read()
     assert np.isfinite(state.channels).all()
     assert np.isfinite(state.truth).all()
     assert np.isnan(state.recorded[len(POSE) :]).all()
-    vehicle.step(0, np.zeros(3), np.ones(4))  # no damper input to write to
-    vehicle.close()
+    vehicle.write(np.zeros(3), np.ones(4))  # no damper input to write to
+    vehicle.step(0)
+    vehicle.stop()
 
 
 # ---------------------------------------------------------------- what does not fit
@@ -449,12 +454,14 @@ def test_a_vehicle_in_km_h_and_degrees(version: int, tmp_path: Path) -> None:
 def drive(fmu: Path, wiring: Wiring, steer: float) -> Array:
     """Half a second at 15 m/s with the steering wheel held; channels, truth and pose (50, 21)."""
     vehicle = Vehicle(Description(fmu), wiring, {"Init.Velocity": 15.0}, 0.01)
+    vehicle.connect()
     rows = []
     for k in range(50):
         state = vehicle.read()
         rows.append(np.concatenate([state.channels, state.truth, state.pose]))
-        vehicle.step(k, np.array([steer, 0.1, 0.0]), np.zeros(4))
-    vehicle.close()
+        vehicle.write(np.array([steer, 0.1, 0.0]), np.zeros(4))
+        vehicle.step(k)
+    vehicle.stop()
     return np.array(rows)
 
 

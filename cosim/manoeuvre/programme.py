@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from cosim.driver import VX, PathDriver
 from cosim.driver_model import DriverModel
-from cosim.vehicle import State
+from cosim.testbench import State
 
 Array = npt.NDArray[np.float64]
 

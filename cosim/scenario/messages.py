@@ -139,9 +139,15 @@ def _kinds(here: dict[str, Any]) -> dict[str, str]:
 
 
 def _resolve(here: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
-    while "$ref" in here:
-        here = schema["$defs"][here["$ref"].rsplit("/", 1)[-1]]
-    return here
+    """Return what a reference stands for, and what an optional field is where it is given."""
+    while True:
+        given = [member for member in here.get("anyOf", ()) if member != {"type": "null"}]
+        if "$ref" in here:
+            here = schema["$defs"][here["$ref"].rsplit("/", 1)[-1]]
+        elif len(given) == 1:
+            here = {name: part for name, part in here.items() if name != "anyOf"} | given[0]
+        else:
+            return here
 
 
 def _choices(schema: dict[str, Any]) -> list[str]:

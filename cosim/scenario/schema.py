@@ -28,6 +28,7 @@ from cosim.scenario.limit import Limit
 from cosim.scenario.manoeuvre import Manoeuvre
 from cosim.scenario.model import Model, with_unit
 from cosim.scenario.osp_scenario import Acting, acting
+from cosim.scenario.real_time import RealTime
 from cosim.scenario.road import Road
 from cosim.scenario.sensor import Sensor
 from cosim.scenario.source import Key, Source
@@ -79,6 +80,9 @@ class Scenario(Model):
         default=(Passive(kind="passive"),), strict=False, min_length=1, description="one run each"
     )
     output: Output = Output()
+    real_time: RealTime | None = Field(
+        default=None, description="go by the clock; as fast as possible if not given"
+    )
     limits: tuple[Limit, ...] = Field(default=(), strict=False, description="what must hold")
     paper_row: str | None = Field(
         default=None, description="row of the paper's Table 4 that the result is shown beside"

@@ -29,7 +29,8 @@ from cosim.quantities import INPUT_QUANTITIES, OUTPUT_QUANTITIES
 from cosim.scenario.load import load
 from cosim.speed_profile import STYLES, speed_profile
 from cosim.start import builtin_start
-from cosim.vehicle import State, builtin_fmu
+from cosim.testbench import State
+from cosim.vehicle import builtin_fmu
 
 SCENARIO = Path(__file__).parents[2] / "scenarios/paper/hockenheim_normal.yaml"
 DURATION = 60

@@ -1,0 +1,1 @@
+"""Runs that go by the clock: absolute deadlines, overruns, and how late every sample was."""
