@@ -54,18 +54,18 @@ validation: $(VENV)/test.stamp ## all gates of the vehicle, the slow ones too: d
 	$(BIN)/python -m pip install --quiet -e '.[docs]'
 	$(BIN)/python -m pytest -q tests/test_vehicle*.py tests/test_road*.py --validation docs/validation
 
-dataset: $(VENV)/test.stamp ## data/paper, data/own and data/evaluation (about seven minutes); runs that are there are kept
-	for name in paper own evaluation; do \
+dataset: $(VENV)/test.stamp ## data/paper, data/own, data/harder and data/evaluation (about ten minutes); runs that are there are kept
+	for name in paper own harder evaluation; do \
 	    $(BIN)/cosim sensor dataset scenarios/datasets/$$name.yaml --out data/$$name || exit; \
 	done
 
-train: dataset ## the shipped filters and networks (about two hours on one core); goes on where it was stopped
+train: dataset ## the shipped filters and networks (about three hours on one core); goes on where it was stopped
 	$(BIN)/cosim sensor train sensor/recipes/fir.yaml --data data/own --out sensor/models
 	$(BIN)/cosim sensor train sensor/recipes/paper.yaml --data data/paper --out build/training/bilstm_w19_ideal --resume
 	$(BIN)/cosim sensor train sensor/recipes/bilstm_residual_w19_ideal.yaml --data data/own --out build/training/bilstm_residual_w19_ideal --resume
 	$(BIN)/cosim sensor train sensor/recipes/bilstm_residual_w19_production.yaml --data data/own --out build/training/bilstm_residual_w19_production --resume
 	for name in carried_ideal carried_production; do \
-	    $(BIN)/cosim sensor train sensor/recipes/$$name.yaml --data data/own --out build/training/$$name --resume || exit; \
+	    $(BIN)/cosim sensor train sensor/recipes/$$name.yaml --data data/own --data data/harder --out build/training/$$name --resume || exit; \
 	done
 	for name in bilstm_w19_ideal bilstm_residual_w19_ideal bilstm_residual_w19_production carried_ideal carried_production; do \
 	    $(BIN)/cosim sensor export build/training/$$name/checkpoint.pt -o sensor/models/$$name.onnx || exit; \

@@ -62,6 +62,7 @@ class Variant:
     kalman: bool = False
     floor: float | None = 0.004
     epochs: int = EPOCHS
+    mirror: bool = False
 
 
 _DELAY, _DIFFERENCES = "@", "d"
@@ -84,6 +85,8 @@ VARIANTS = (
     replace(FULL, name="Kalman", kalman=True,
             what="with the Kalman filter's estimate"),
     replace(FULL, name="longer", what="twice the epochs", epochs=2 * EPOCHS),
+    replace(FULL, name="mirror", what="mirror images among the runs", mirror=True),
+    replace(FULL, name="longer with mirror", what="both", epochs=2 * EPOCHS, mirror=True),
 )  # fmt: skip
 
 
@@ -145,7 +148,9 @@ def fit(variant: Variant, seed: int, training: Sequence[Run], prepare: Prepare, 
     from sensor.carried.network import CarriedConfig, CarriedNetwork
     from sensor.carried.training import Trainer
 
-    schedule = Schedule(epochs=variant.epochs, learning_rate=6e-3, weight_floor=variant.floor)
+    schedule = Schedule(
+        epochs=variant.epochs, learning_rate=6e-3, weight_floor=variant.floor, mirror=variant.mirror
+    )
     recipe = CarriedRecipe(
         family="carried", name="study", condition="ideal", seed=seed,
         network=Shape(front=48, units=64, hidden=48), training=schedule,
