@@ -66,7 +66,8 @@ def save(training: Training, path: Path) -> None:
 
 
 def load(training: Training, path: Path) -> None:
-    """Go on from a checkpoint. A longer training of the same recipe may, so `epochs` may differ.
+    """Go on from a checkpoint. A longer training of the same recipe may, so its numbers of epochs may
+    differ.
 
     Raises SensorError if it belongs to another recipe.
     """
@@ -116,4 +117,4 @@ def write_record(record: dict[str, Any], out: Path) -> None:
 
 
 def _without_epochs(recipe: BaseModel) -> dict[str, Any]:
-    return recipe.model_dump(exclude={"training": {"epochs"}})
+    return recipe.model_dump(exclude={"training": {"epochs", "coarse_epochs"}})

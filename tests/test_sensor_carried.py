@@ -287,7 +287,7 @@ def test_a_checkpoint_of_another_recipe_is_refused(tmp_path: Path) -> None:
     save(Trainer(recipe(2), training, held), tmp_path / "c.pt")
     load(Trainer(recipe(3), training, held), tmp_path / "c.pt")  # a longer training may go on
     with pytest.raises(SensorError, match="another recipe"):
-        load(Trainer(recipe(2, coarse=1), training, held), tmp_path / "c.pt")
+        load(Trainer(recipe(2, coarse=1), training, held), tmp_path / "c.pt")  # mirrored
 
 
 def test_the_network_stays_within_a_tenth_of_the_windowed_work() -> None:
