@@ -66,7 +66,7 @@ def save(training: Training, path: Path) -> None:
 
 
 def load(training: Training, path: Path) -> None:
-    """Go on from a checkpoint. A longer training of the same recipe may, so its numbers of epochs may
+    """Go on from a checkpoint. A longer training of the same recipe may, so numbers of epochs may
     differ.
 
     Raises SensorError if it belongs to another recipe.
