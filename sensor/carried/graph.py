@@ -25,7 +25,7 @@ import numpy.typing as npt
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from sensor.carried.features import INTEGRALS, LINE, MEANS, STEER, features
+from sensor.carried.features import INTEGRALS, LINE, MEANS, PITCH, ROLL, STEER, YAW, features
 from sensor.carried.network import SCALE, CarriedNetwork
 from sensor.carried.operations import Arrays, feature_constants, operations
 from sensor.carried.runtime import STATES, CarriedSensor
@@ -125,7 +125,7 @@ def verify(path: Path, network: CarriedNetwork, samples: int = 400) -> None:
     speed = np.linspace(1.0, 35.0, samples)
     channels[:, CHANNEL_NAMES.index("Car.vx")] = speed
     channels[:, WHEEL_SPEEDS] = speed[:, np.newaxis] + random.normal(scale=0.02, size=(samples, 4))
-    channels[:, [5, *STEER]] *= 0.1
+    channels[:, [ROLL, PITCH, YAW, *STEER]] *= 0.1  # the size that a rough road gives them
     channels = channels.astype(np.float32).astype(np.float64)  # what the graph is given
     commands = random.uniform(size=(samples, 4))
     sensor = CarriedSensor(path)

@@ -67,7 +67,8 @@ class CarriedNetwork(nn.Module):
         x = (features[..., :-1] - self.mean) / self.std
         with torch.autocast("cpu", torch.bfloat16, enabled=self.coarse):
             ahead, state = self.lstm(torch.tanh(self.front(x)), state)
-        ahead, state = ahead.float(), (state[0].float(), state[1].float())
+        if self.coarse:
+            ahead, state = ahead.float(), (state[0].float(), state[1].float())
         hidden = torch.relu(self.hidden(ahead))
         velocity = level * (self.output(hidden) + self.straight(x))
         log_deviation = self.log_deviation(hidden.detach()).clamp(-6.0, 3.0)
