@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim import loop
-from cosim.comfort import ride_figures
 from cosim.control.choice import controller_of
 from cosim.control.damper_map import damper_map
 from cosim.course import Course, course_of
@@ -25,10 +24,20 @@ from cosim.grip import grip_figures
 from cosim.loop import Blocks, ControllerBlock, SensorBlock
 from cosim.manoeuvre import Plan, friction_of, manoeuvre_of, motion_of
 from cosim.manoeuvre.programme import ProgrammedDriver
-from cosim.quantities import GRIP_SHARE, SEAT, TRAVEL, TYRE_LOAD, Quantity
+from cosim.quantities import (
+    ATTITUDE,
+    DAMPER_FORCE,
+    DAMPER_SPEED,
+    GRIP_SHARE,
+    SEAT,
+    TRAVEL,
+    TYRE_LOAD,
+    Quantity,
+)
 from cosim.realtime.clock import Clock, clock_of
 from cosim.record import record_groups_of
 from cosim.recorder import Recorder
+from cosim.ride import Ride, ride_figures
 from cosim.scenario.controllers import Controller, Passive
 from cosim.scenario.schema import Scenario
 from cosim.sensor import estimator_file, estimator_of, measurement_of, stage_problems
@@ -259,8 +268,9 @@ def _steps(scenario: Scenario, plan: Plan) -> tuple[int, str]:
 
 def _comfort(recorder: Recorder) -> dict[str, float]:
     settled = round(SETTLING_S / STEP_S)
-    seat, travel, load = (_recorded(recorder, q)[settled:] for q in (SEAT, TRAVEL, TYRE_LOAD))
-    return ride_figures(seat, travel, load, SAMPLE_RATE_HZ)
+    quantities = (SEAT, TRAVEL, TYRE_LOAD, ATTITUDE[1:], DAMPER_FORCE, DAMPER_SPEED)
+    ride = Ride(*(_recorded(recorder, q)[settled:] for q in quantities))
+    return ride_figures(ride, SAMPLE_RATE_HZ)
 
 
 def _recorded(recorder: Recorder, quantities: Sequence[Quantity]) -> Array:

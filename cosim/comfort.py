@@ -1,6 +1,4 @@
-"""Ride figures of a run: ISO 2631-1 weighted acceleration, suspension deflection, dynamic tyre
-load.
-"""
+"""Vibration at the seat: frequency weighting and figures of ISO 2631-1:1997."""
 
 from __future__ import annotations
 
@@ -33,22 +31,28 @@ WK: Final = Weighting(12.5, 12.5, 0.63, (2.37, 0.91, 3.35, 0.91))  # vertical, s
 WD: Final = Weighting(2.0, 2.0, 0.63, None)  # horizontal, seated
 
 
-def weighting_gain(weighting: Weighting, frequency: npt.ArrayLike) -> Array:
-    """Return |H(f)| of a weighting, ISO 2631-1:1997 Annex A, equations A.1 to A.4."""
+def weighting_response(
+    weighting: Weighting, frequency: npt.ArrayLike
+) -> npt.NDArray[np.complex128]:
+    """Return H(f) of a weighting, ISO 2631-1:1997 Annex A, equations A.1 to A.4."""
     p = 2j * np.pi * np.asarray(frequency, dtype=np.float64)
     w = weighting
     w1, w2, w3, w4 = (2 * np.pi * f for f in (w.f1, w.f2, w.f3, w.f4))
     high = p * p / (p * p + np.sqrt(2) * w1 * p + w1 * w1)
     low = 1 / (1 + np.sqrt(2) * p / w2 + (p / w2) ** 2)
     transition = (1 + p / w3) / (1 + p / (w.q4 * w4) + (p / w4) ** 2)
-    gain = high * low * transition
+    response = high * low * transition
     if w.step is not None:
         f5, q5, f6, q6 = w.step
         w5, w6 = 2 * np.pi * f5, 2 * np.pi * f6
         step = (1 + p / (q5 * w5) + (p / w5) ** 2) / (1 + p / (q6 * w6) + (p / w6) ** 2)
-        gain = gain * step * (w5 / w6) ** 2
-    magnitude: Array = np.abs(gain)
-    return magnitude
+        response = response * step * (w5 / w6) ** 2
+    return np.asarray(response, dtype=np.complex128)
+
+
+def weighting_gain(weighting: Weighting, frequency: npt.ArrayLike) -> Array:
+    """Return |H(f)| of a weighting."""
+    return np.asarray(np.abs(weighting_response(weighting, frequency)), dtype=np.float64)
 
 
 def weighted_rms(acceleration: Array, weighting: Weighting, rate_hz: float) -> float:
@@ -65,22 +69,13 @@ def weighted_rms(acceleration: Array, weighting: Weighting, rate_hz: float) -> f
     return float(np.sqrt(power.sum()) / n)
 
 
-def ride_figures(seat: Array, travel: Array, load: Array, rate_hz: float) -> dict[str, float]:
-    """Return the comfort figures from seat accelerations (n, 3) [m/s2], travels (n, 4) [m], loads
-    (n, 4) [N].
+def vibration_dose(acceleration: Array, weighting: Weighting, rate_hz: float) -> float:
+    """Return the fourth power vibration dose value [m/s^1.75] of a signal (n,), clause 6.3.2.
 
-    weighted_acceleration_m_s2: vibration total value at the seat, clause 6.5 with k = 1 (comfort,
-    clause 8.2); deflection_rms_m and tyre_load_rms_n: rms about each wheel's mean, over all wheels.
-    Empty with less than two seconds of signal, or where the vehicle does not give them.
+    The weighting is applied as in `weighted_rms`, its phase with it.
     """
-    if len(seat) < 2 * rate_hz or not np.isfinite(np.hstack([seat, travel, load])).all():
-        return {}
-    axes = [
-        weighted_rms(seat[:, axis], weighting, rate_hz)
-        for axis, weighting in enumerate((WD, WD, WK))
-    ]
-    return {
-        "weighted_acceleration_m_s2": float(np.sqrt(np.square(axes).sum())),
-        "deflection_rms_m": float(np.sqrt(np.mean(np.square(travel - travel.mean(axis=0))))),
-        "tyre_load_rms_n": float(np.sqrt(np.mean(np.square(load - load.mean(axis=0))))),
-    }
+    n = len(acceleration)
+    spectrum = np.fft.rfft(acceleration - acceleration.mean())
+    response = weighting_response(weighting, np.fft.rfftfreq(n, 1 / rate_hz))
+    weighted = np.fft.irfft(spectrum * response, n)
+    return float((np.sum(weighted**4) / rate_hz) ** 0.25)

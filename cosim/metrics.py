@@ -27,7 +27,27 @@ ERROR_FIGURES: Final = (
     "error_high_m_s",
     "sign_agreement_percent",
 )
-COMFORT_FIGURES: Final = ("weighted_acceleration_m_s2", "deflection_rms_m", "tyre_load_rms_n")
+COMFORT_FIGURES: Final = (
+    "weighted_acceleration_m_s2",
+    "weighted_vertical_m_s2",
+    "vibration_dose_m_s1_75",
+    "deflection_rms_m",
+    "tyre_load_rms_n",
+    "roll_rms_deg",
+    "pitch_rms_deg",
+    "roll_rate_rms_deg_s",
+    "pitch_rate_rms_deg_s",
+    "damper_energy_j",
+)
+CONTROL_FIGURES: Final = (
+    "decisions.wrong_percent",
+    "fallback.active_percent",
+    "fallback.times",
+    "fallback.force_step_n",
+    "against_truth.gain_kept_percent",
+    "against_truth.tyre_load_percent",
+    "against_truth.deflection_percent",
+)
 GRIP_FIGURES: Final = ("peak_percent", "mean_percent")
 RUN_FIGURES: Final = (
     "lap_time_s",
@@ -85,6 +105,7 @@ MANOEUVRE_FIGURES: Final = {
 # A unit is read off the end of a figure's name; of two endings that fit, the first here counts.
 UNITS: Final = {
     "_m_s2": "m/s²",
+    "_m_s1_75": "m/s¹·⁷⁵",
     "_m_s": "m/s",
     "_deg_s": "°/s",
     "_per_s": "1/s",
@@ -94,6 +115,7 @@ UNITS: Final = {
     "_ms": "ms",
     "_s": "s",
     "_n": "N",
+    "_j": "J",
     "_m": "m",
 }
 
@@ -123,6 +145,7 @@ def metric_names(
         for figure in ERROR_FIGURES
     ]
     names += [f"comfort.{figure}" for figure in COMFORT_FIGURES]
+    names += CONTROL_FIGURES
     names += [f"grip.{wheel}.{figure}" for wheel in WHEELS for figure in GRIP_FIGURES]
     names += [f"timing.{figure}" for figure in (*STEP_TIMES, *LATENESS)]
     names += [f"manoeuvre.{figure}" for figure in MANOEUVRE_FIGURES.get(manoeuvre or "", ())]

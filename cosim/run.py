@@ -210,6 +210,8 @@ def _run(
     progress: Progress | None,
 ) -> RunOutcome:
     from cosim.compare import compare
+    from cosim.control.damper_map import damper_map
+    from cosim.control.figures import control_figures
     from cosim.faults.figures import fault_figures
 
     label = controller.label
@@ -237,6 +239,7 @@ def _run(
         **compare(assembly.recorder, assembly.initial_command, scenario.sensor.condition),
         "faults": fault_figures(scenario.acting_faults, assembly.recorder),
         "comfort": dict(result.comfort),
+        **control_figures(controller, assembly.recorder, damper_map(scenario.parameters)),
         "manoeuvre": dict(result.manoeuvre),
         "grip": dict(result.grip),
         "timing": dict(result.timing),
@@ -246,8 +249,11 @@ def _run(
 
 def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -> Outcome:
     from cosim.compare import paper_figures
+    from cosim.control.against_truth import against_truth
 
     figures = {run.label: run.figures for run in runs}
+    for label, found in against_truth(scenario.controllers, figures).items():
+        figures[label]["against_truth"] = found
     limits, notes = counted(scenario.limits, scenario.road.surface_name, scenario.real_time)
     verdicts = (*evaluate(limits, figures), *_unfinished(scenario, figures))
     metrics = finite(
@@ -326,6 +332,11 @@ def resolved_yaml(scenario: Scenario) -> str:
     if scenario.vehicle.fmu != "builtin":
         data["vehicle"]["fmu"] = str(scenario.resolve(scenario.vehicle.fmu).resolve())
         del data["vehicle"]["fmi_version"]
+    for own, controller in zip(data["controllers"], scenario.controllers, strict=True):
+        if controller.network is not None:
+            own["network"] = str(scenario.resolve(controller.network).resolve())
+        if getattr(controller, "fallback", None) is not None:
+            del own["initial_command"]
     if scenario.sensor.network is not None:
         data["sensor"]["network"] = str(scenario.resolve(scenario.sensor.network).resolve())
     for fault in data["faults"]:

@@ -8,7 +8,6 @@ from typing import Any, Final
 
 from cosim.limits import Verdict
 from cosim.metrics import (
-    COMFORT_FIGURES,
     ESTIMATORS,
     PARTS,
     WHEELS,
@@ -26,8 +25,13 @@ NAMES: Final = {
 }
 COMFORT_NAMES: Final = {
     "weighted_acceleration_m_s2": "ISO 2631-1 weighted acceleration",
+    "vibration_dose_m_s1_75": "Vibration dose",
     "deflection_rms_m": "Suspension deflection rms",
     "tyre_load_rms_n": "Dynamic tyre load rms",
+}
+CONTROL_NAMES: Final = {
+    "decisions.wrong_percent": "wrong decisions",
+    "against_truth.gain_kept_percent": "comfort gain kept",
 }
 MANOEUVRE_NAMES: Final = {
     "clearance_m": "Smallest clearance to the cones",
@@ -123,23 +127,25 @@ def _sensor_note(sensor: Mapping[str, str]) -> str:
 
 
 def comparison_table(runs: Mapping[str, Mapping[str, Any]]) -> Table:
-    """Return comfort, deflection and tyre load of each run beside its estimate.
+    """Return comfort, deflection, tyre load and decisions of each run beside its estimate.
 
     Percentages are changes against the first run.
     """
     columns = (
         "run",
-        *(f"{COMFORT_NAMES[name]} [{unit_of(name)}]" for name in COMFORT_FIGURES),
+        *(f"{title} [{unit_of(name)}]" for name, title in COMFORT_NAMES.items()),
+        *(f"{title} [{unit_of(name)}]" for name, title in CONTROL_NAMES.items()),
         "estimate RMSE [m/s]",
         "estimate accuracy [%]",
     )
     first = next(iter(runs.values()))
     rows = []
     for label, figures in runs.items():
-        comfort = [_against(first, figures, f"comfort.{name}") for name in COMFORT_FIGURES]
+        comfort = [_against(first, figures, f"comfort.{name}") for name in COMFORT_NAMES]
+        control = [number(figure(figures, name), 1) for name in CONTROL_NAMES]
         rmse = figure(figures, "sensor.overall.rmse_m_s")
         accuracy = figure(figures, "sensor.overall.accuracy_percent")
-        rows.append((label, *comfort, number(rmse), number(accuracy, 1)))
+        rows.append((label, *comfort, *control, number(rmse), number(accuracy, 1)))
     return Table("Controllers compared", columns, tuple(rows))
 
 

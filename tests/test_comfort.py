@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
+from scipy import signal
 
-from cosim.comfort import WD, WK, Weighting, ride_figures, weighted_rms, weighting_gain
+from cosim.comfort import (
+    WD,
+    WK,
+    Weighting,
+    vibration_dose,
+    weighted_rms,
+    weighting_gain,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -76,40 +84,48 @@ def test_the_rate_is_that_of_the_signal() -> None:
     assert weighted_rms(at_200, WK, 200.0) == pytest.approx(weighted_rms(at_100, WK, 100.0))
 
 
-def signals(count: int = 2000) -> tuple[Array, Array, Array]:
-    """Seat, travel and load of known rms."""
-    t = np.arange(count) / RATE
-    sine = np.sin(2 * np.pi * 1.0 * t)
-    seat = np.column_stack([0.3 * sine, 0.4 * sine, 0.5 * sine])
-    travel = 0.02 + np.outer(sine, [0.01, 0.02, 0.03, 0.04])
-    load = 6000.0 + np.outer(sine, [100.0, 200.0, 300.0, 400.0])
-    return seat, travel, load
+# ---------------------------------------------------------------- dose values
 
 
-def test_figures_of_a_run() -> None:
-    found = ride_figures(*signals(), RATE)
-    horizontal, vertical = (float(weighting_gain(w, 1.0)) / np.sqrt(2) for w in (WD, WK))
-    total = np.sqrt((0.3**2 + 0.4**2) * horizontal**2 + 0.5**2 * vertical**2)
-    assert found["weighted_acceleration_m_s2"] == pytest.approx(total)
-    over_all_wheels = np.sqrt(np.mean(np.square([1.0, 2.0, 3.0, 4.0]))) / np.sqrt(2)
-    assert found["deflection_rms_m"] == pytest.approx(0.01 * over_all_wheels)
-    assert found["tyre_load_rms_n"] == pytest.approx(100.0 * over_all_wheels)
-    assert len(found) == 3
+@pytest.mark.parametrize("weighting", [WK, WD], ids=["wk", "wd"])
+@pytest.mark.parametrize("frequency", [1.0, 5.0, 20.0])
+def test_the_dose_of_a_sine(weighting: Weighting, frequency: float) -> None:
+    """The mean of sin^4 is 3 / 8."""
+    sine = 1.7 * np.sin(2 * np.pi * frequency * TIME)
+    amplitude = 1.7 * float(weighting_gain(weighting, frequency))
+    expected = amplitude * (3 / 8 * 20.0) ** 0.25
+    assert vibration_dose(sine, weighting, RATE) == pytest.approx(expected, rel=1e-6)
 
 
-def test_wheels_that_stand_differently_add_nothing() -> None:
-    """About each wheel's own mean: static loads are not a ride."""
-    seat, travel, load = signals()
-    stand = np.array([0.0, 1.0, -2.0, 3.0])
-    shifted = ride_figures(seat, travel + 0.01 * stand, load + 500.0 * stand, RATE)
-    assert shifted == pytest.approx(ride_figures(seat, travel, load, RATE))
+def test_the_dose_grows_with_the_fourth_root_of_time_and_knows_peaks() -> None:
+    noise = np.random.default_rng(3).standard_normal(20_000)
+    short, long = (vibration_dose(np.tile(noise, n), WK, RATE) for n in (1, 16))
+    assert long == pytest.approx(2 * short, rel=1e-3)
+    bump = np.zeros(20_000)
+    bump[1000:1010] = 30.0
+    as_rms = noise * weighted_rms(bump, WK, RATE) / weighted_rms(noise, WK, RATE)
+    assert vibration_dose(bump, WK, RATE) > 2 * vibration_dose(as_rms, WK, RATE)
 
 
-@pytest.mark.parametrize("part", [0, 1, 2])
-def test_no_figures_without_signals_or_with_too_few(part: int) -> None:
-    seat, travel, load = signals()
-    (seat, travel, load)[part][7, 0] = np.nan
-    assert ride_figures(seat, travel, load, RATE) == {}
-    assert ride_figures(*signals(199), RATE) == {}
-    assert ride_figures(*signals(200), RATE) != {}
-    assert ride_figures(*signals(0), RATE) == {}
+def test_the_weighted_signal_is_that_of_analogue_filters() -> None:
+    """The dose needs the phase too: SciPy's state-space simulation of the same transfer functions,
+    at 4 kHz, where holding the input matters no more.
+    """
+    rate, w = 4000.0, WK
+    f = np.arange(0, 8, 1 / rate)
+    pulse = np.exp(-(((f - 2.0) / 0.05) ** 2))
+    w1, w2, w3, w4 = (2 * np.pi * x for x in (w.f1, w.f2, w.f3, w.f4))
+    assert w.step is not None
+    f5, q5, f6, q6 = w.step
+    w5, w6 = 2 * np.pi * f5, 2 * np.pi * f6
+    parts = [
+        ([1, 0, 0], [1, np.sqrt(2) * w1, w1**2]),
+        ([w2**2], [1, np.sqrt(2) * w2, w2**2]),
+        ([1 / w3, 1], [1 / w4**2, 1 / (w.q4 * w4), 1]),
+        ([1 / w5**2, 1 / (q5 * w5), 1], [1 / w6**2, 1 / (q6 * w6), 1]),
+    ]
+    weighted = pulse
+    for numerator, denominator in parts:
+        weighted = signal.lsim((numerator, denominator), weighted, f)[1]
+    expected = (np.sum((weighted * (w5 / w6) ** 2) ** 4) / rate) ** 0.25
+    assert vibration_dose(pulse, WK, rate) == pytest.approx(expected, rel=0.01)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cosim.control.add import Add, SkyhookAdd
 from cosim.control.body import Body
 from cosim.control.damper_map import DamperMap
+from cosim.control.fallback import Fallback, FallbackParameters
 from cosim.control.fixed import FixedDampers
 from cosim.control.hybrid import Hybrid
 from cosim.control.law import Law, LawController
@@ -23,7 +24,14 @@ def controller_of(chosen: settings.Controller, dampers: DamperMap) -> Controller
         return FixedDampers(chosen.command)
     body = Body()
     law = _law(chosen, dampers, body)
-    return LawController(law, chosen.feedback == "truth", chosen.initial_command, body)
+    controller = LawController(law, chosen.feedback == "truth", chosen.initial_command, body)
+    safe = chosen.fallback
+    if safe is None:
+        return controller
+    parameters = FallbackParameters(
+        safe.command, safe.largest_deviation_m_s, safe.fade_s, safe.back_after_s
+    )
+    return Fallback(controller, parameters)
 
 
 def _law(chosen: settings.LawSettings, dampers: DamperMap, body: Body) -> Law:

@@ -14,6 +14,7 @@ from cosim.control.skyhook import SKYHOOK_GAIN
 from cosim.scenario.latency import Latency
 from cosim.scenario.model import NAME_PATTERN, Model, with_unit
 from cosim.scenario.sensor import EstimatorName, Sensor
+from sensor.channels import PASSIVE_COMMAND
 from sensor.estimators import names
 
 
@@ -70,6 +71,32 @@ class Fixed(OneRun):
     command: float = Field(ge=0, le=1, description="damper command, 0 soft, 1 hard")
 
 
+class Fallback(Model):
+    """What the dampers do while the estimate is not valid or too uncertain."""
+
+    command: float = Field(
+        default=PASSIVE_COMMAND, ge=0, le=1, description="safe damper command, 0 soft, 1 hard"
+    )
+    largest_deviation_m_s: float | None = Field(
+        default=None,
+        gt=0,
+        description="predicted deviation that is trusted, at each wheel; any if not given",
+        json_schema_extra=with_unit("m/s"),
+    )
+    fade_s: float = Field(
+        default=0.5,
+        ge=0.01,
+        description="from the law's command to the safe one, and back",
+        json_schema_extra=with_unit("s"),
+    )
+    back_after_s: float = Field(
+        default=1.0,
+        ge=0,
+        description="for how long the estimate must be trusted before the law is heard again",
+        json_schema_extra=with_unit("s"),
+    )
+
+
 class Law(OneRun):
     """A law that reads the suspension velocities."""
 
@@ -82,6 +109,21 @@ class Law(OneRun):
         le=1,
         description="damper command until the first valid estimate, 0 soft, 1 hard",
     )
+    fallback: Fallback | None = Field(
+        default=None, description="a safe command while the estimate is not to be trusted"
+    )
+
+    @model_validator(mode="after")
+    def _fallback_is_for_estimates(self) -> Law:
+        if self.fallback is None:
+            return self
+        if self.feedback == "truth":
+            sentence = "the truth is always valid; a fallback needs feedback: estimate"
+            raise PydanticCustomError("fallback", sentence)
+        if "initial_command" in self.model_fields_set:
+            sentence = "the fallback's command is the initial one; leave initial_command out"
+            raise PydanticCustomError("fallback", sentence)
+        return self
 
 
 class Gained(Law):
