@@ -9,7 +9,7 @@ from cosim.metrics import figure
 from cosim.scenario.controllers import Controller, Law, Passive
 
 _COMFORT: Final = "comfort.weighted_acceleration_m_s2"
-_OWN: Final = {"name", "feedback", "estimator", "network", "fallback", "initial_command"}
+_OWN: Final = {"name", "feedback", "estimator", "network", "fallback", "initial_command", "latency"}
 
 
 def against_truth(
@@ -35,12 +35,15 @@ def against_truth(
 
 
 def _twin(law: Law, laws: Sequence[Law]) -> Law | None:
-    """Return the same law on the truth, if there is one and this is not it."""
+    """Return the same law on the truth, if there is one and this is not it; of several that of the
+    same latency.
+    """
     if law.feedback == "truth":
         return None
     settings = law.model_dump(exclude=_OWN)
     on_truth = (other for other in laws if other.feedback == "truth")
-    return next((o for o in on_truth if o.model_dump(exclude=_OWN) == settings), None)
+    twins = [one for one in on_truth if one.model_dump(exclude=_OWN) == settings]
+    return next((one for one in twins if one.latency == law.latency), twins[0] if twins else None)
 
 
 def _figures(
