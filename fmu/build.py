@@ -1,4 +1,4 @@
-"""Builds the FMUs of a model: ``python fmu/build.py [--model vehicle] [--out cosim/fmus]``.
+"""Builds the FMUs of all models: ``python fmu/build.py [--model vehicle] [--out cosim/fmus]``.
 
 A model is a folder with ``variables.toml`` and C files; ``fmu/common`` holds the FMI ceremony. Both
 FMI versions are compiled from the same sources and zipped with their descriptions. The same input
@@ -89,21 +89,22 @@ def trial_programs(
     return paths
 
 
-def model_folder(name: str) -> Path:
-    """A model by name (a folder of fmu/) or by path."""
+def model_folders(name: str | None) -> list[Path]:
+    """A model by name (a folder of fmu/) or by path; all of them without one."""
+    known = sorted(path.parent for path in FMU_DIRECTORY.glob("*/variables.toml"))
+    if name is None:
+        return known
     for candidate in (FMU_DIRECTORY / name, Path(name)):
         if (candidate / "variables.toml").is_file():
-            return candidate.resolve()
-    known = sorted(path.parent.name for path in FMU_DIRECTORY.glob("*/variables.toml"))
-    raise BuildError(
-        f"There is no model '{name}'; the models here are {', '.join(known) or 'none'}."
-    )
+            return [candidate.resolve()]
+    names = ", ".join(path.name for path in known)
+    raise BuildError(f"There is no model '{name}'; the models here are {names or 'none'}.")
 
 
 def arguments(argv: list[str] | None) -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description="Build the FMUs (FMI 2.0 and 3.0) of a model.")
-    parser.add_argument("--model", default="vehicle", help="folder of fmu/, or a path")
+    parser.add_argument("--model", help="folder of fmu/, or a path; all of fmu/ by default")
     parser.add_argument("--out", type=Path, default=FMU_DIRECTORY.parent / "cosim" / "fmus")
     parser.add_argument("--cc", help="C compiler; default $CC, cc, gcc or clang")
     parser.add_argument("--cflags", default="", help="more compiler options")
@@ -115,11 +116,11 @@ def main(argv: list[str] | None = None) -> int:
     """Command line; returns the exit code."""
     options = arguments(argv)
     try:
-        model = model_folder(options.model)
-        for path in build(model, options.out, options.cc, options.cflags, options.platform):
-            print(path)
-        if model.name == "vehicle":
-            print(build_road_reader(options.out, options.cc, options.cflags))
+        for model in model_folders(options.model):
+            for path in build(model, options.out, options.cc, options.cflags, options.platform):
+                print(path)
+            if model.name == "vehicle":
+                print(build_road_reader(options.out, options.cc, options.cflags))
         return 0
     except (BuildError, TableError) as error:
         print(error, file=sys.stderr)

@@ -24,11 +24,12 @@ time is refused. Errors are always logged; warnings and information only while l
 <p>Licence: <a href="licenses/license.txt">licenses/license.txt</a>. The FMU needs nothing but the C
 library. A reference experiment, if there is one, is in <a href="fmi-ls-ref.txt">fmi-ls-ref.txt</a>.
 </p>
-<h2>Building from source</h2>
+{notes}<h2>Building from source</h2>
 <p><code>sources/buildDescription.xml</code> names the files to compile and the options that give
 the results of the binary bit for bit. The headers of FMI {fmi}.0 come from the importer; those the
 binary was built with are in <code>{headers}/</code>. In the folder <code>sources/</code>:</p>
-<pre>cc -std=c11 -O3 -ffp-contract=off -fPIC -shared -I../{headers} *.c -lm -o {identifier}.so</pre>
+<pre>cc {standard} -O3 -ffp-contract=off -fPIC -shared -I../{headers} *.c -lm \
+  -o {identifier}.so</pre>
 <p>To link the FMU statically beside others, define
 <code>FMI{fmi}_FUNCTION_PREFIX={identifier}_</code> and use headers that heed it.</p>
 <h2>Variables</h2>
@@ -38,13 +39,19 @@ binary was built with are in <code>{headers}/</code>. In the folder <code>source
 """
 
 
-def build_description(table: Table, sources: Sequence[str], options: str) -> bytes:
+def standard(table: Table) -> str:
+    """The compiler's option for the model's language, C99 or C11."""
+    return f"-std={table.model['language'].lower()}"
+
+
+def build_description(table: Table, sources: Sequence[str], options: Sequence[str]) -> bytes:
     """``sources/buildDescription.xml``: of FMI 3.0, and since 2.0.4 of FMI 2 too."""
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     configuration = add(root, "BuildConfiguration", modelIdentifier=table.model["identifier"])
     files = add(
-        configuration, "SourceFileSet", language="C11", compiler="gcc", compilerOptions=options
-    )
+        configuration, "SourceFileSet", language=table.model["language"], compiler="gcc",
+        compilerOptions=" ".join([standard(table), *options]),
+    )  # fmt: skip
     for name in sources:
         add(files, "SourceFile", name=name)
     add(configuration, "Library", name="m", external=True, description="C mathematics library")
@@ -75,8 +82,10 @@ def _cells(variable: Variable) -> list[str]:
     return [variable.name, kind, variable.unit, start, *limits, variable.description]
 
 
-def index(table: Table, version: str, fmi: int, headers: str) -> bytes:
-    """``documentation/index.html``: what the model is, how to use and build it, every variable."""
+def index(table: Table, version: str, fmi: int, headers: str, notes: str) -> bytes:
+    """``documentation/index.html``: what the model is, how to use and build it, every variable;
+    `notes` is what the model has to say of itself, as HTML.
+    """
     model = table.model
     rows = "\n".join(
         "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in _cells(v)) + "</tr>"
@@ -91,6 +100,8 @@ def index(table: Table, version: str, fmi: int, headers: str) -> bytes:
         fmi=fmi,
         headers=headers,
         identifier=model["identifier"],
+        standard=standard(table),
+        notes=notes,
         heads="".join(f"<th>{head}</th>" for head in heads),
         rows=rows,
     )

@@ -5,11 +5,31 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <string.h>
 #include "instance.h"
 
 #define STATUS_OK 0
 #define STATUS_WARNING 1
 #define STATUS_ERROR 3
+
+/* What `--resources=` and `--token=` of the command line say, taken out of the arguments; without them a folder that
+ * does not exist, and the token that is compiled in. */
+static const char *face_resources = "/no where", *face_token;
+
+static void face_arguments(int *argc, char **argv)
+{
+    int kept = 1;
+    face_token = model_token;
+    for (int i = 1; i < *argc; i++) {
+        if (strncmp(argv[i], "--resources=", 12) == 0)
+            face_resources = argv[i] + 12;
+        else if (strncmp(argv[i], "--token=", 8) == 0)
+            face_token = argv[i] + 8;
+        else
+            argv[kept++] = argv[i];
+    }
+    *argc = kept;
+}
 
 /* Provided by the program. */
 static void face_heard(void *env, int status, const char *category, const char *message);

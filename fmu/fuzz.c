@@ -272,11 +272,11 @@ static void renew(Slot *slot)
 {
     FMI(FreeInstance)(slot->c);
     *slot = (Slot){.speaks = !chance(5), .logging = !chance(3), .stop = INFINITY};
-    const char *name = chance(20) ? "" : "fuzz", *token = chance(20) ? "{}" : model_token;
-    const char *resources = chance(3) ? NULL : some_text();
+    const char *name = chance(20) ? "" : "fuzz", *token = chance(20) ? "{}" : face_token;
+    const char *resources = chance(3) ? some_text() : face_resources;
     slot->c = face_instantiate(name, token, resources, slot->speaks, slot->logging, slot, &slot->callbacks);
     judge(slot, "instantiate", slot->c ? STATUS_OK : STATUS_ERROR);
-    if (slot->c && (!*name || token != model_token))
+    if (slot->c && (!*name || token != face_token))
         FAIL("an instance without a name or of another token was made");
 }
 
@@ -306,6 +306,7 @@ static void one_call(void)
 
 int main(int argc, char **argv)
 {
+    face_arguments(&argc, argv);
     const uint64_t wanted = argc > 2 ? strtoull(argv[2], NULL, 10) : 100000;
     random_state = (argc > 1 ? strtoull(argv[1], NULL, 10) : 1) * 0x9E3779B97F4A7C15u + 1;
     texts_given = argc > 3 ? argc - 3 : 0;

@@ -89,7 +89,7 @@ def source(table: Table, token: str) -> str:
     for kind, name in TABLE_NAMES.items():
         rows = [
             f"    {{{quote(v.name)}, {quote(v.unit)}, offsetof(Variables, {v.field}), {_role(v)}, "
-            f"{number(v.minimum)}, {number(v.maximum)}}},"
+            f"{number(v.minimum)}, {number(v.maximum)}, {int(v.can_be_missing)}}},"
             for v in table.of_type(kind)
         ]
         lines += ["", f"static const VariableInfo {name}[] = {{", *rows]

@@ -18,6 +18,10 @@ FMU_DIRECTORY = Path(__file__).resolve().parent
 COMMON = FMU_DIRECTORY / "common"
 # An importer compiles against headers of its own, so the standard keeps them out of sources/.
 HEADERS = "extra/org.suspension-cosim/fmi-headers"
+HEADERS_LICENCE = f"""
+The files in {HEADERS}/ are those of the FMI standard, under the licence that stands in each of
+them: Copyright (C) Modelica Association Project "FMI", 2-Clause BSD License.
+"""
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
 
@@ -99,7 +103,7 @@ def fmu_contents(model: Path, fmi: int, binary: bytes, target: str) -> dict[str,
     table = read_table(model / "variables.toml")
     token, version = instantiation_token(model), project_version()
     sources = package_sources(model, table, fmi)
-    build_description = documents.build_description(table, c_files(sources), " ".join(PORTABLE))
+    build_description = documents.build_description(table, c_files(sources), PORTABLE)
     files = {f"sources/{name}": content for name, content in sources.items()}
     files |= {f"{HEADERS}/{name}": content for name, content in fmi_headers(fmi).items()}
     files |= {
@@ -108,7 +112,7 @@ def fmu_contents(model: Path, fmi: int, binary: bytes, target: str) -> dict[str,
         else describe.fmi3(table, version, token),
         binary_path(table.model["identifier"], fmi, target): binary,
         "sources/buildDescription.xml": build_description,
-        "documentation/index.html": documents.index(table, version, fmi, HEADERS),
+        "documentation/index.html": documents.index(table, version, fmi, HEADERS, _notes(model)),
     }
     for folder in ("resources", "extra"):
         files |= folder_files(model / folder, folder)
@@ -121,10 +125,17 @@ def fmu_contents(model: Path, fmi: int, binary: bytes, target: str) -> dict[str,
     )
     licence = FMU_DIRECTORY.parent / "LICENSE"
     if licence.is_file():
-        files["documentation/licenses/license.txt"] = licence.read_bytes()
+        own = licence.read_bytes()
+        files["documentation/licenses/license.txt"] = own + HEADERS_LICENCE.encode()
     if table.terminals:
         files["terminalsAndIcons/terminalsAndIcons.xml"] = documents.terminals(table)
     return files | _reference(model, table, files, fmi, target)
+
+
+def _notes(model: Path) -> str:
+    """What the model has to say of itself on its page, as HTML."""
+    path = model / "notes.html"
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
 def _reference(
@@ -136,9 +147,12 @@ def _reference(
         return {}
     experiment = reference.read_experiment(path, table)
     note = {"documentation/fmi-ls-ref.txt": reference.notes(experiment, identifier)}
+    if table.model["needs"]:  # who puts it in adds the result
+        return note | reference.reference_files(experiment, identifier, [])
     if target != target_platform():
         return note
-    return note | reference.reference_files(experiment, identifier, files, fmi)
+    rows = reference.result(experiment, files, fmi)
+    return note | reference.reference_files(experiment, identifier, rows)
 
 
 def write_zip(path: Path, files: dict[str, bytes]) -> None:

@@ -21,6 +21,7 @@ from toolchain import BuildError
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 KEYS = {"name", "description", "step_size", "stop_time", "every", "outputs", "stimuli"}
+OPTIONAL = {"tolerance"}
 Rows = list[list[float]]
 
 
@@ -35,6 +36,7 @@ class Experiment:
     every: int  # steps to a row of the result
     outputs: tuple[str, ...]
     stimuli: dict[str, list[tuple[float, float]]]
+    tolerance: float = 0.0  # to which processors agree, in the outputs' unit
 
     @property
     def steps(self) -> int:
@@ -45,7 +47,7 @@ class Experiment:
 def read_experiment(path: Path, table: Table) -> Experiment:
     """Read and check ``reference.toml``; raises BuildError with all problems at once."""
     raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    problems = [f"unknown key '{key}'" for key in sorted(set(raw) - KEYS)]
+    problems = [f"unknown key '{key}'" for key in sorted(set(raw) - KEYS - OPTIONAL)]
     problems += [f"no '{key}'" for key in sorted(KEYS - set(raw))]
     outputs = tuple(each_corner(raw.get("outputs", [])))
     known = {v.name for v in table.of_causality("output") if v.type == "Float64"}
@@ -56,7 +58,7 @@ def read_experiment(path: Path, table: Table) -> Experiment:
     problems += [f"no stimulus for '{name}'" for name in sorted(inputs - set(stimuli))]
     if problems:
         raise BuildError("\n".join(f"{path}: {p}" for p in problems))
-    own = {key: raw[key] for key in ("name", "description", "step_size", "stop_time", "every")}
+    own = {key: raw[key] for key in raw if key not in ("outputs", "stimuli")}
     return Experiment(**own, outputs=outputs, stimuli=stimuli)
 
 
@@ -118,13 +120,14 @@ def run(experiment: Experiment, folder: Path, fmi: int) -> Rows:
 def notes(experiment: Experiment, identifier: str) -> bytes:
     """``documentation/fmi-ls-ref.txt``, which the layered standard recommends."""
     row = experiment.every * experiment.step_size
+    met = f"to {experiment.tolerance:g} m/s" if experiment.tolerance else "bit for bit"
     return f"""Reference experiment '{experiment.name}': {experiment.description}.
 
 {FOLDER}/{identifier}_in.csv has the inputs from 0 s to {experiment.stop_time} s,
 one row to each communication step of {experiment.step_size} s, to be held over the step that begins
 there; {identifier}_ref.csv has outputs every {row} s, as the binary gave them when it was built.
 All other variables keep their start values. The step is a power of two, so that every way of
-counting time gives the same numbers: the binary meets the result bit for bit.
+counting time gives the same numbers: the binary meets the result {met}.
 """.encode()
 
 
@@ -165,17 +168,19 @@ def _manifest(related: list[tuple[str, str, str, str]], files: dict[str, bytes])
     return document(root)
 
 
-def reference_files(
-    experiment: Experiment, identifier: str, contents: dict[str, bytes], fmi: int
-) -> dict[str, bytes]:
-    """The files of FMI-LS-REF by their path in the FMU, whose other contents are given."""
+def result(experiment: Experiment, contents: dict[str, bytes], fmi: int) -> Rows:
+    """What an FMU of these contents answers."""
     with tempfile.TemporaryDirectory() as name:
         for path, content in contents.items():
             if path.startswith(("binaries/", "resources/", "modelDescription")):
                 file = Path(name, path)
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_bytes(content)
-        rows = run(experiment, Path(name), fmi)
+        return run(experiment, Path(name), fmi)
+
+
+def reference_files(experiment: Experiment, identifier: str, rows: Rows) -> dict[str, bytes]:
+    """The files of FMI-LS-REF by their path in the FMU, with the result's rows."""
     stem, h = identifier, experiment.step_size
     files = {
         f"{stem}_in.csv": _csv(list(experiment.stimuli), stimuli(experiment)),
@@ -189,7 +194,7 @@ def reference_files(
         (f"{stem}.exp", "application/x-ma-hs-experiments", "experiment/smoke-test",
          experiment.description),
         (f"{stem}_in.csv", "text/csv", "testcase", f"Inputs of '{what}', one row to each step"),
-        (f"{stem}_ref.csv", "text/csv", "result", f"Outputs of '{what}', to be met bit for bit"),
+        (f"{stem}_ref.csv", "text/csv", "result", f"Outputs of '{what}'"),
         (f"{stem}_ref.opt", "text/plain", "other", "Options of the FMI Cross-Check"),
     ]  # fmt: skip
     files["fmi-ls-manifest.xml"] = _manifest(related, files)

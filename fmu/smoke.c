@@ -1,8 +1,8 @@
 /* Lives an FMU's life many times over: instantiate, read and write every variable, step, save, serialise, go back,
  * reset, free. Linked with a model's sources, with the sanitizers (make sanitize) or for another platform (make
  * cross); exit code 0 if all went well and going back gave the same bytes. Arguments: --lives=n, --instances=n that
- * are made and freed besides, and Name=value for start values. It ends with the sum of the last life's outputs, for
- * comparison. */
+ * are made and freed besides, Name=value for start values, and those of face.h. It ends with the sum of the last life's
+ * outputs, for comparison. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -106,10 +106,10 @@ static bool step(void *c, int k)
 
 static void wrong_calls(void *c)
 {
-    const unsigned none = 123456789u, first = 0;
+    const unsigned none = 123456789u, output = MODEL_OUTPUTS_BEGIN;
     double value = NAN;
     CHECK(GET_REALS(c, &none, 1, &value, 1) == STATUS_ERROR);
-    CHECK(SET_REALS(c, &first, 1, &value, 1) == STATUS_ERROR);
+    CHECK(SET_REALS(c, &output, 1, &value, 1) == STATUS_ERROR);
     CHECK(!step(c, 1000)); /* not where the instance stands */
     CHECK(face_enter(c, 0.0, false, 0.0) == STATUS_ERROR);
 }
@@ -134,7 +134,7 @@ static StateHandle through_bytes(void *c, StateHandle state)
 
 static void *instance(bool logger, fmi2CallbackFunctions *callbacks)
 {
-    return face_instantiate("smoke", model_token, "/no where", logger, true, NULL, callbacks);
+    return face_instantiate("smoke", face_token, face_resources, logger, true, NULL, callbacks);
 }
 
 static void live(bool logger, Buffers *now, Buffers *again, int n, char **settings)
@@ -181,11 +181,12 @@ static double sum_of_outputs(const Buffers *b)
 
 int main(int argc, char **argv)
 {
+    face_arguments(&argc, argv);
     const char *asked = setting("--lives", argc, argv), *more = setting("--instances", argc, argv);
     const int lives = asked ? atoi(asked) : 50, instances = more ? atoi(more) : 0;
     Buffers now = buffers_new(), again = buffers_new();
     fmi2CallbackFunctions callbacks;
-    CHECK(!face_instantiate("smoke", "not the token", NULL, false, false, NULL, &callbacks));
+    CHECK(!face_instantiate("smoke", "not the token", face_resources, false, false, NULL, &callbacks));
     for (int i = 0; i < lives; i++)
         live(i != 1, &now, &again, argc, argv);
     for (int i = 0; i < instances; i++) {

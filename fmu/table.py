@@ -62,6 +62,7 @@ class Variable:
     maximum: float = math.inf
     nominal: float | None = None
     declared_type: str = ""
+    can_be_missing: bool = False  # an input that is NaN or infinite where there is no value
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,8 @@ from pathlib import Path
 VERSIONS = (2, 3)  # of FMI
 # -ffp-contract=off: the same results on processors with and without fused multiply-add
 # -Wno-psabi: vectors of four go to inlined functions only, where no calling convention applies
-PORTABLE = [
-    *["-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"],
-    "-Wno-psabi",
-]
-FLAGS = [*PORTABLE, "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]
+PORTABLE = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi"]
+FLAGS = ["-std=c11", *PORTABLE, "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]
 SANITIZE = [  # -O0: with sanitizers the optimiser takes half a minute over the vectors
     *["-std=c11", "-O0", "-g", "-ffp-contract=off", "-fno-omit-frame-pointer", "-Wall", "-Wextra"],
     *["-Werror", "-Wno-psabi", "-fsanitize=address,undefined,float-cast-overflow"],

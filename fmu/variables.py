@@ -36,11 +36,11 @@ VARIABILITIES = {
 TABLES = {"model", "units", "types", "group", "terminals", "initial"}
 MODEL_KEYS = {
     "name", "identifier", "description", "author", "license", "log_categories",
-    "step_size", "stop_time",
+    "step_size", "stop_time", "language", "needs",
 }  # fmt: skip
 VARIABLE_KEYS = {
     "name", "type", "unit", "display", "quantity", "description", "start", "min", "max", "nominal",
-    "causality", "variability",
+    "causality", "variability", "missing",
 }  # fmt: skip
 
 
@@ -97,6 +97,8 @@ def _check(variable: Variable, units: dict[str, Unit], raw: dict[str, Any]) -> l
         problems.append(f"{name}: an output is calculated and has no start value")
     if not variable.description:
         problems.append(f"{name}: no description")
+    if variable.can_be_missing and (variable.type, variable.causality) != ("Float64", "input"):
+        problems.append(f"{name}: only an input of type Float64 can be missing")
     if variable.type != "Float64":
         return problems
     if variable.unit not in units:
@@ -146,6 +148,7 @@ def _expand(raw: dict[str, Any], problems: list[str]) -> tuple[Field, list[Varia
             minimum=float(raw.get("min", -math.inf)),
             maximum=float(raw.get("max", math.inf)),
             nominal=raw.get("nominal"),
+            can_be_missing=raw.get("missing", False),
         )
         for i, (corner, start) in enumerate(zip(corners, starts, strict=True))
     ]
@@ -166,7 +169,8 @@ def _read_model(raw: dict[str, Any], problems: list[str]) -> dict[str, Any]:
     categories = [tuple(c) for c in raw.get("log_categories", [])]
     own = {name for name, _ in categories}
     categories = [c for c in LAYER_CATEGORIES if c[0] not in own] + categories
-    return {"step_size": 0.01, "stop_time": 10.0, **raw, "log_categories": categories}
+    defaults = {"step_size": 0.01, "stop_time": 10.0, "language": "C11", "needs": ""}
+    return {**defaults, **raw, "log_categories": categories}
 
 
 def _read_types(

@@ -45,11 +45,11 @@ def available(master: str) -> None:
             pytest.skip(f"{error}; on Debian and Ubuntu: apt install libtbb12")
 
 
-def run(master: str, task: Task) -> Rows:
-    """Outputs after each step."""
+def run(master: str, tasks: list[Task]) -> list[Rows]:
+    """Outputs after each step of each task, one task after the other in one process."""
     available(master)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit({"libcosimpy": libcosim, "ecospy": ecos}[master], task).result()
+        return list(pool.map({"libcosimpy": libcosim, "ecospy": ecos}[master], tasks))
 
 
 def libcosim(task: Task) -> Rows:

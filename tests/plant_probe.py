@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 VEHICLE = ROOT / "fmu" / "vehicle"
 PROBE = ROOT / "tests" / "vehicle_probe" / "probe.c"
-FLAGS = [*toolchain.PORTABLE, "-Wall", "-Wextra", "-Werror"]
+FLAGS = ["-std=c11", *toolchain.PORTABLE, "-Wall", "-Wextra", "-Werror"]
 
 MOTION = np.dtype(
     [

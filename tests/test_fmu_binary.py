@@ -83,6 +83,16 @@ def test_a_step_past_the_stop_time_is_an_error(make: Make) -> None:
     endless.fmu.doStep(0.0, 2.0)
 
 
+def test_a_step_of_more_internal_steps_than_can_be_counted_is_refused(make: Make) -> None:
+    """2^31 steps of 0.01 ms are six hours: a time in the wrong unit is more likely."""
+    for step in (21474.84, 1e300):
+        face = make().initialise(Solver_Step=1e-5)
+        said = refused(face, lambda h=step, f=face: f.fmu.doStep(0.0, h))
+        assert f"a step of {step:g} s is cut into" in said
+        face.fmu.reset()
+        face.initialise().step(0, H)
+
+
 def test_messages_have_declared_categories_and_no_worse_a_status(make: Make, folder: Path) -> None:
     face = make()
     declared = {

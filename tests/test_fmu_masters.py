@@ -62,22 +62,39 @@ def ours(version: int, road: str, inputs: Array) -> Array:
     return rows
 
 
-@pytest.mark.parametrize(("master", "version"), PAIRS)
-def test_four_seconds_over_a_bump(master: str, version: int, road: str) -> None:
-    rows = np.array(foreign_masters.run(master, task(version, road, commands())))
+def to_the_ends(step: Array) -> Array:
+    """Damper commands at 0 or 1."""
+    ends = step[:64].copy()
+    ends[:, 4:] = np.round(ends[:, 4:])
+    return ends
+
+
+def beyond_the_ends(step: Array) -> Array:
+    """The same commands as a master sends them that knows no limits."""
+    ends = to_the_ends(step)
+    ends[:, 4:] += np.where(ends[:, 4:] > 0.5, 0.7, -3.0)
+    return ends
+
+
+@pytest.fixture(scope="module", params=PAIRS, ids=lambda pair: f"{pair[0]}-fmi{pair[1]}")
+def driven(request: pytest.FixtureRequest, road: str) -> tuple[int, list[Array]]:
+    """Four seconds, and half a second with commands beyond their range."""
+    master, version = request.param
+    inputs = (commands(), beyond_the_ends(commands()))
+    rows = foreign_masters.run(master, [task(version, road, i) for i in inputs])
+    return version, [np.array(r) for r in rows]
+
+
+def test_four_seconds_over_a_bump(driven: tuple[int, list[Array]], road: str) -> None:
+    version, (rows, _) = driven
     expected = ours(version, road, commands())
     assert np.ptp(expected[:, output_names().index("Car.CFL.q0")]) > 0.02
     np.testing.assert_array_equal(rows, expected)
 
 
-@pytest.mark.parametrize(("master", "version"), PAIRS)
 def test_a_command_beyond_its_range_does_not_stop_a_master(
-    master: str, version: int, road: str
+    driven: tuple[int, list[Array]], road: str
 ) -> None:
     """It gets a Warning and goes on with the limit."""
-    within = commands()[:64]
-    within[:, 4:] = np.round(within[:, 4:])
-    beyond = within.copy()
-    beyond[:, 4:] += np.where(within[:, 4:] > 0.5, 0.7, -3.0)
-    rows = np.array(foreign_masters.run(master, task(version, road, beyond)))
-    np.testing.assert_array_equal(rows, ours(version, road, within))
+    version, (_, rows) = driven
+    np.testing.assert_array_equal(rows, ours(version, road, to_the_ends(commands())))

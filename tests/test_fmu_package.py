@@ -47,7 +47,11 @@ def test_places_of_the_standard(version: int) -> None:
         "resources", "extra",
     }  # fmt: skip
     licence = fmus.entry(version, "documentation/licenses/license.txt")
-    assert licence == (ROOT / "LICENSE").read_bytes()
+    assert licence.startswith((ROOT / "LICENSE").read_bytes())
+    assert f"{package.HEADERS}/" in licence.decode()
+    for name in names:
+        if name.startswith(package.HEADERS):
+            assert b"2-Clause BSD License" in fmus.entry(version, name)
 
 
 class Links(HTMLParser):

@@ -68,7 +68,9 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         return NULL;
     uri_to_path(i->resources);
     strip_separator(i->resources);
-    ModelStatus status = check_identity(i, instanceName, fmuGUID);
+    ModelStatus status = instance_load(i);
+    if (status != MODEL_ERROR)
+        status = check_identity(i, instanceName, fmuGUID);
     if (status == MODEL_OK && fmuType != fmi2CoSimulation)
         status = refuse(i, MODEL_NAME " cannot be instantiated for model exchange: it is for co-simulation only.");
     if (status == MODEL_OK)

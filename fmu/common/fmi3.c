@@ -39,7 +39,9 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     if (!i)
         return NULL;
     strip_separator(i->resources);
-    ModelStatus status = check_identity(i, instanceName, instantiationToken);
+    ModelStatus status = instance_load(i);
+    if (status != MODEL_ERROR)
+        status = check_identity(i, instanceName, instantiationToken);
     if (status == MODEL_OK && eventModeUsed)
         status = refuse(i, MODEL_NAME " cannot be instantiated with event mode: hasEventMode is false.");
     if (status == MODEL_OK && nRequiredIntermediateVariables)

@@ -3,9 +3,12 @@
 
 #include <math.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { STATE_ALIGNMENT = 64 }; /* bytes: a cache line, and the widest vector */
 
 static char *copy_text(const char *text)
 {
@@ -24,7 +27,7 @@ void strip_separator(char *path)
 static void start_over(Instance *instance)
 {
     memcpy(&instance->model.v, &model_start, sizeof model_start);
-    memset(instance->model.state, 0, model_state_size);
+    memset(instance->model.state, 0, instance->model.state_size);
     memset(&instance->progress, 0, sizeof instance->progress);
     memset(instance->limited, 0, sizeof instance->limited);
     instance->progress.phase = INSTANTIATED;
@@ -39,8 +42,7 @@ Instance *instance_new(const char *name, const char *resources, void (*logger)(v
         return NULL;
     instance->name = copy_text(name ? name : "");
     instance->resources = copy_text(resources ? resources : "");
-    instance->model.state = calloc(1, model_state_size + 1); /* never a request for 0 bytes */
-    if (!instance->name || !instance->resources || !instance->model.state) {
+    if (!instance->name || !instance->resources) {
         instance_free(instance);
         return NULL;
     }
@@ -48,10 +50,25 @@ Instance *instance_new(const char *name, const char *resources, void (*logger)(v
     instance->model.host = instance;
     instance->logger = logger;
     instance->environment = environment;
+    memcpy(instance->model.token, model_token, strlen(model_token) + 1);
     for (size_t i = 0; i < MODEL_CATEGORIES; i++)
         instance->category_enabled[i] = logging;
-    start_over(instance);
     return instance;
+}
+
+ModelStatus instance_load(Instance *instance)
+{
+    Model *m = &instance->model;
+    ModelStatus status = model_load(m);
+    if (status == MODEL_ERROR)
+        return status;
+    instance->memory = calloc(1, m->state_size + STATE_ALIGNMENT);
+    if (!instance->memory)
+        return refuse(instance, MODEL_NAME " cannot be instantiated: no memory for a state of %zu bytes.",
+                      m->state_size);
+    m->state = (char *)instance->memory + STATE_ALIGNMENT - (uintptr_t)instance->memory % STATE_ALIGNMENT;
+    start_over(instance);
+    return status;
 }
 
 void instance_free(Instance *instance)
@@ -60,7 +77,7 @@ void instance_free(Instance *instance)
         return;
     if (instance->model.host) /* otherwise creation failed half-way and the model has never seen it */
         model_release(&instance->model);
-    free(instance->model.state);
+    free(instance->memory);
     free(instance->resources);
     free(instance->name);
     free(instance);
@@ -146,10 +163,10 @@ ModelStatus check_identity(const Instance *instance, const char *name, const cha
 {
     if (!name || !name[strspn(name, " \t\r\n")])
         return refuse(instance, MODEL_NAME " cannot be instantiated without an instance name.");
-    if (!token || strcmp(token, model_token) != 0)
+    if (!token || strcmp(token, instance->model.token) != 0)
         return refuse(instance, MODEL_NAME " cannot be instantiated: the token \"%s\" is not that of this binary, "
                       "\"%s\"; modelDescription.xml and binary come from different builds.", token ? token : "(null)",
-                      model_token);
+                      instance->model.token);
     return MODEL_OK;
 }
 

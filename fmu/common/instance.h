@@ -39,6 +39,7 @@ typedef struct Instance {
     bool limited[MODEL_REALS]; /* inputs whose warning of a value beyond the range has been given */
     char *name;
     char *resources;
+    void *memory; /* what model.state lies in */
     void *environment;
     void (*logger)(void); /* the importer's callback, of the type of its FMI version; may be NULL */
 } Instance;
@@ -48,8 +49,9 @@ typedef struct Instance {
 void deliver(const Instance *instance, ModelStatus status, const char *category, const char *message);
 extern const char message_escapes[];
 
-/* NULL if memory is short. Copies both strings. */
+/* NULL if memory is short. Copies both strings. Before anything but refuse(), the instance must be loaded. */
 Instance *instance_new(const char *name, const char *resources, void (*logger)(void), void *environment, bool logging);
+ModelStatus instance_load(Instance *instance);
 void instance_free(Instance *instance);
 
 /* "dir/" -> "dir", in place: importers differ in whether the resources path ends with a separator. */

@@ -2,7 +2,8 @@
  *
  * A model's memory is plain old data: `Variables` (generated from variables.toml: every parameter, input and output)
  * followed by its own state. Copying those bytes is copying the FMU state. What is derived from
- * parameters (tables, the road) hangs off `derived`, is never changed while stepping and can be rebuilt. */
+ * parameters or resources (tables, the road, a network) hangs off `derived`, holds nothing that one step leaves to
+ * the next, and can be rebuilt. */
 #ifndef MODEL_H
 #define MODEL_H
 
@@ -13,20 +14,24 @@ typedef enum { MODEL_OK, MODEL_WARNING, MODEL_ERROR = 3 } ModelStatus; /* the nu
 
 typedef struct Model {
     Variables v;          /* parameters, inputs and outputs, by the names of variables.toml */
-    void *state;          /* model_state_size bytes of plain old data, owned by the FMI layer */
-    void *derived;        /* owned by the model: model_prepare() builds it, model_release() frees it */
+    void *state;          /* state_size bytes of plain old data, 64-byte aligned, owned by the FMI layer */
+    size_t state_size;    /* model_load() sets it */
+    char token[40];       /* what an importer must know the FMU by; model_load() may replace it */
+    void *derived;        /* owned by the model: model_load() or model_prepare() builds it, model_release() frees it */
     const char *resources; /* absolute path of the FMU's resources directory, or "" */
     void *host;           /* the FMI layer's instance, for model_log() */
 } Model;
 
-extern const size_t model_state_size;
+/* At instantiation: says how large the state is, and reads what the FMU's resources fix for good. Nothing is
+ * allocated after it but by model_prepare(). On an error it has said why. */
+ModelStatus model_load(Model *m);
 
 /* Parameters -> derived data; loads the road. Called when initialisation is left, and again when a state of
  * another parameterisation has been restored. Frees what an earlier call built. */
 ModelStatus model_prepare(Model *m);
 
-/* Initial state (static equilibrium) and the outputs that belong to it. */
-ModelStatus model_initialise(Model *m);
+/* Initial state (static equilibrium) at the time `start` and the outputs that belong to it. */
+ModelStatus model_initialise(Model *m, double start);
 
 /* Advance from t to t + h with the inputs held; leaves the outputs of t + h in m->v. */
 ModelStatus model_step(Model *m, double t, double h);

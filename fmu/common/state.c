@@ -10,12 +10,12 @@ typedef struct {
     uint64_t checksum; /* of all that follows, in serialised bytes; 0 in memory */
     Progress progress;
     Variables v;
-    unsigned char state[]; /* model_state_size bytes */
+    unsigned char state[]; /* model.state_size bytes */
 } Saved;
 
-static size_t saved_size(void)
+static size_t saved_size(const Instance *instance)
 {
-    return sizeof(Saved) + model_state_size;
+    return sizeof(Saved) + instance->model.state_size;
 }
 
 /* FNV-1a: a file that was cut, edited or filled with something else does not pass. */
@@ -27,15 +27,15 @@ static uint64_t checksum(const unsigned char *bytes, size_t size)
     return hash;
 }
 
-static uint64_t checksum_of(const unsigned char *saved)
+static uint64_t checksum_of(const Instance *instance, const unsigned char *saved)
 {
     const size_t begin = offsetof(Saved, progress);
-    return checksum(saved + begin, saved_size() - begin);
+    return checksum(saved + begin, saved_size(instance) - begin);
 }
 
 static ModelStatus check_ours(const Instance *instance, const char *function, const void *state)
 {
-    if (!state || strncmp(state, model_token, sizeof((Saved *)0)->token) != 0)
+    if (!state || strncmp(state, instance->model.token, sizeof((Saved *)0)->token) != 0)
         return refuse(instance, "%s: this is not a state of " MODEL_NAME ".", function);
     return MODEL_OK;
 }
@@ -50,9 +50,9 @@ static Saved *room(const Instance *instance, const char *function, void **state)
     }
     if (*state)
         return check_ours(instance, function, *state) ? NULL : *state;
-    Saved *saved = calloc(1, saved_size());
+    Saved *saved = calloc(1, saved_size(instance));
     if (!saved)
-        refuse(instance, "%s: no memory for a state of %zu bytes.", function, saved_size());
+        refuse(instance, "%s: no memory for a state of %zu bytes.", function, saved_size(instance));
     return saved;
 }
 
@@ -61,10 +61,10 @@ ModelStatus state_get(Instance *instance, const char *function, void **state)
     Saved *saved = room(instance, function, state);
     if (!saved)
         return MODEL_ERROR;
-    strncpy(saved->token, model_token, sizeof saved->token - 1);
+    strncpy(saved->token, instance->model.token, sizeof saved->token - 1);
     memcpy(&saved->progress, &instance->progress, sizeof saved->progress);
     memcpy(&saved->v, &instance->model.v, sizeof saved->v);
-    memcpy(saved->state, instance->model.state, model_state_size);
+    memcpy(saved->state, instance->model.state, instance->model.state_size);
     *state = saved;
     return MODEL_OK;
 }
@@ -73,7 +73,7 @@ static void restore(Instance *instance, const Saved *saved)
 {
     memcpy(&instance->progress, &saved->progress, sizeof saved->progress);
     memcpy(&instance->model.v, &saved->v, sizeof saved->v);
-    memcpy(instance->model.state, saved->state, model_state_size);
+    memcpy(instance->model.state, saved->state, instance->model.state_size);
 }
 
 ModelStatus state_set(Instance *instance, const char *function, const void *state)
@@ -108,7 +108,7 @@ ModelStatus state_size(Instance *instance, const char *function, const void *sta
         return MODEL_ERROR;
     if (!size)
         return refuse(instance, "%s: the pointer for the size is null.", function);
-    *size = saved_size();
+    *size = saved_size(instance);
     return MODEL_OK;
 }
 
@@ -116,11 +116,11 @@ ModelStatus state_serialize(Instance *instance, const char *function, const void
 {
     if (check_ours(instance, function, state))
         return MODEL_ERROR;
-    if (!bytes || size < saved_size())
+    if (!bytes || size < saved_size(instance))
         return refuse(instance, "%s: the buffer has %zu bytes, a state needs %zu.", function, bytes ? size : 0,
-                      saved_size());
-    const uint64_t sum = checksum_of(state);
-    memcpy(bytes, state, saved_size());
+                      saved_size(instance));
+    const uint64_t sum = checksum_of(instance, state);
+    memcpy(bytes, state, saved_size(instance));
     memcpy((char *)bytes + offsetof(Saved, checksum), &sum, sizeof sum);
     return MODEL_OK;
 }
@@ -128,11 +128,11 @@ ModelStatus state_serialize(Instance *instance, const char *function, const void
 ModelStatus state_deserialize(Instance *instance, const char *function, const void *bytes, size_t size, void **state)
 {
     uint64_t sum;
-    if (!bytes || size != saved_size() || strncmp(bytes, model_token, sizeof((Saved *)0)->token) != 0)
+    if (!bytes || size != saved_size(instance) || strncmp(bytes, instance->model.token, sizeof((Saved *)0)->token) != 0)
         return refuse(instance, "%s: these %zu bytes are not a serialised state of this build of " MODEL_NAME ".",
                       function, bytes ? size : 0);
     memcpy(&sum, (const char *)bytes + offsetof(Saved, checksum), sizeof sum);
-    if (sum != checksum_of(bytes))
+    if (sum != checksum_of(instance, bytes))
         return refuse(instance, "%s: these %zu bytes are a damaged state of " MODEL_NAME ".", function, size);
     Saved *saved = room(instance, function, state);
     if (!saved)

@@ -15,6 +15,7 @@ typedef struct {
     size_t offset;    /* of the value inside Variables */
     Role role;
     double min, max;  /* +-INFINITY where variables.toml gives no limit */
+    int can_be_missing; /* an input that is NaN or infinite where there is no value */
 } VariableInfo;
 
 typedef struct {

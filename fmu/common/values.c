@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-static const VariableInfo time_info = {"time", "s", 0, INDEPENDENT, -INFINITY, INFINITY}; /* it lives in Progress */
+static const VariableInfo time_info = {"time", "s", 0, INDEPENDENT, -INFINITY, INFINITY, 0}; /* it lives in Progress */
 
 /* The generated struct begins with all reals in the order of their value references. */
 static double *reals_of(Instance *instance) { return (double *)&instance->model.v; }
@@ -92,7 +92,7 @@ static void clear_outputs(Instance *instance)
                 memcpy((char *)&instance->model.v + info->offset, (const char *)&model_start + info->offset,
                        value_size(kind));
         }
-    memset(instance->model.state, 0, model_state_size);
+    memset(instance->model.state, 0, instance->model.state_size);
 }
 
 ModelStatus check_outputs(Instance *instance, const char *function)
@@ -116,7 +116,7 @@ ModelStatus bring_up_to_date(Instance *instance, const char *function)
     if (prepared == MODEL_ERROR)
         return prepared;
     clear_outputs(instance);
-    ModelStatus initialised = model_initialise(&instance->model);
+    ModelStatus initialised = model_initialise(&instance->model, instance->progress.start_time);
     if (initialised == MODEL_ERROR || check_outputs(instance, function))
         return MODEL_ERROR;
     instance->progress.outdated = false;
@@ -180,7 +180,8 @@ static ModelStatus check_role(const Instance *instance, const char *function, co
 
 static bool in_range(const VariableInfo *info, double value)
 {
-    return value >= info->min && value <= info->max && fabs(value) <= DBL_MAX;
+    return (value >= info->min && value <= info->max && fabs(value) <= DBL_MAX)
+           || (info->can_be_missing && !isfinite(value));
 }
 
 static ModelStatus check_number(const Instance *instance, const char *function, const VariableInfo *info, double value)

@@ -1,9 +1,13 @@
 /* The vehicle model as the FMI layer sees it: prepared, initialised, stepped. The equations are in derivative.c. */
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include "vehicle.h"
 
-const size_t model_state_size = sizeof(Memory);
+ModelStatus model_load(Model *m) {
+    m->state_size = sizeof(Memory);
+    return MODEL_OK;
+}
 
 ModelStatus model_prepare(Model *m) {
     model_release(m);
@@ -23,7 +27,8 @@ void model_release(Model *m) {
     m->derived = NULL;
 }
 
-ModelStatus model_initialise(Model *m) {
+ModelStatus model_initialise(Model *m, double start) {
+    (void)start; /* nothing in the model depends on the time */
     const Vehicle *c = m->derived;
     Memory *memory = m->state;
     Work w;
@@ -44,8 +49,13 @@ ModelStatus model_step(Model *m, double t, double h) {
     const Vehicle *c = m->derived;
     Memory *memory = m->state;
     Work w;
-    const int steps = (int)ceil(h / m->v.Solver_Step - 1e-6);
-    vehicle_integrate(&m->v, c, memory, h / (steps < 1 ? 1 : steps), steps < 1 ? 1 : steps, &w);
+    const double wanted = fmax(ceil(h / m->v.Solver_Step - 1e-6), 1.0);
+    if (wanted > INT_MAX) { /* hours of computing: a mistake in the unit of time, most likely */
+        model_log(m, MODEL_ERROR, "logStatusError", "a step of %g s is cut into %g steps of Solver.Step = %g s; there may be %d", h, wanted, m->v.Solver_Step, INT_MAX);
+        return MODEL_ERROR;
+    }
+    const int steps = (int)wanted;
+    vehicle_integrate(&m->v, c, memory, h / steps, steps, &w);
     memory->steer = m->v.DM_Steer_Ang;
     vehicle_outputs(&m->v, c, memory, &w);
     const double *xs = (const double *)&memory->x;

@@ -14,7 +14,11 @@ typedef struct {
     double gain;
 } Derived;
 
-const size_t model_state_size = sizeof(State);
+ModelStatus model_load(Model *m)
+{
+    m->state_size = sizeof(State);
+    return MODEL_OK;
+}
 
 ModelStatus model_prepare(Model *m)
 {
@@ -50,8 +54,9 @@ static void outputs(Model *m)
     strncpy(m->v.Out_Resources, m->resources, MODEL_STRING_SIZE - 1);
 }
 
-ModelStatus model_initialise(Model *m)
+ModelStatus model_initialise(Model *m, double start)
 {
+    (void)start;
     State *s = m->state;
     for (int i = 0; i < 4; i++)
         s->x[i] = m->v.Lag_Start;
