@@ -10,7 +10,7 @@ HOUR_DATA ?= data/hour
 EVALUATION ?= build/evaluation.json
 SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/*)
+SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/* fmu/sensor/*)
 
 .PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness manoeuvres roads benchmarks sanitize clean study retrain-check
 
@@ -43,7 +43,7 @@ check: $(VENV)/test.stamp ## formatting
 fmu: $(VENV)/demo.stamp ## rebuild the FMUs after a change of the C sources
 	$(BIN)/python fmu/build.py
 
-cross: $(VENV)/demo.stamp ## FMUs with binaries for Linux, Windows and macOS in dist/ (the first time some ten minutes)
+cross: $(VENV)/demo.stamp ## vehicle FMUs for Linux, Windows and macOS in dist/, and the binaries of cosim pack --platform (the first time some ten minutes)
 	$(BIN)/python -m pip install --quiet -e '.[cross]'
 	$(BIN)/python fmu/cross.py
 

@@ -41,6 +41,7 @@ from cosim.ride import Ride, ride_figures
 from cosim.scenario.controllers import Controller, Passive
 from cosim.scenario.schema import Scenario
 from cosim.sensor import estimator_file, estimator_of, measurement_of, stage_problems
+from cosim.sensor_fmu import FmuSensor
 from cosim.start import builtin_start, checked_parameters
 from cosim.testbench import Testbench
 from cosim.vehicle import Vehicle, builtin_fmu
@@ -88,6 +89,7 @@ class Assembly:
     plan: Plan
     steps: int
     if_late: str  # why the run ends where the driver has not come to the end
+    sensor_fmu: FmuSensor | None = None  # the estimator behind the sensor, if it is an FMU
 
     def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
         """Run to the end of the lap or the last step, and let go of the bench whatever happens."""
@@ -99,6 +101,8 @@ class Assembly:
             wall = time.perf_counter() - begin
         finally:
             self.blocks.vehicle.stop()
+            if self.sensor_fmu is not None:
+                self.sensor_fmu.close()
         done = self.driver.completed
         return RunResult(
             steps_done=last,
@@ -145,11 +149,12 @@ def assemble(
     does not load.
     """
     wiring, description, course, plan = checked_parts(scenario, roads)
-    file, acting = None, scenario.acting_faults
+    file, own, acting = None, None, scenario.acting_faults
     if sensor is None:
         settings = controller.sensor_of_run(scenario.sensor)
         file = estimator_file(scenario, settings)
-        sensor = over_gaps(estimator_of(scenario, settings), acting)
+        own = estimator_of(scenario, settings)
+        sensor = over_gaps(own, acting)
     latency = controller.latency_of_run(scenario.latency)
     sensor = late_sensor(sensor, latency)
     passive = isinstance(controller, Passive) and dampers is None
@@ -180,6 +185,7 @@ def assemble(
         plan=plan,
         steps=steps,
         if_late=if_late,
+        sensor_fmu=own if isinstance(own, FmuSensor) else None,
     )
 
 

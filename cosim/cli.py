@@ -125,6 +125,43 @@ def check(fmus: tuple[Path, ...], as_json: bool, static: bool, timeout: float) -
 
 
 @main.command()
+@click.argument("network", metavar="MODEL.onnx", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--out",
+    metavar="FILE.fmu",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Where the FMU goes.",
+)
+@click.option(
+    "--fmi",
+    default="3",
+    show_default=True,
+    type=click.Choice(["2", "3"]),
+    help="Version of FMI.",
+)
+@click.option(
+    "--platform",
+    "platforms",
+    metavar="P",
+    multiple=True,
+    help="A platform beside this one, such as x86_64-windows, or all; may be repeated. "
+    "'make cross' compiles for them.",
+)
+def pack(network: Path, out: Path, fmi: str, platforms: tuple[str, ...]) -> None:
+    """Write a trained network as an FMU that needs no other software.
+
+    The FMU is run beside the network before it is written.
+    """
+    one_thread()
+    with failures_as_exit_codes():
+        from cosim.pack.command import run as run_pack
+
+        run_pack(network, out, int(fmi), platforms)
+
+
+@main.command()
 @click.argument("path", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print the facts as JSON on stdout.")
 @click.option("--all", "every", is_flag=True, help="Show long lists of variables in full.")

@@ -61,13 +61,17 @@ class Description:
 class Slave:
     """An instance of an FMU whose chosen real inputs and outputs are NumPy arrays.
 
-    `inputs` (n_in,) is written by the caller before `step`; `outputs` (n_out,) is filled by `read`.
-    Both are in the FMU's own units and never move in memory. Every failing call raises `FmuError`
-    with the FMU's own words.
+    `inputs` (n_in,) is written by the caller before `step`; `outputs` (n_out,) and the Boolean
+    outputs `flags` (n_flags,) are filled by `read`. All are in the FMU's own units and never move
+    in memory. Every failing call raises `FmuError` with the FMU's own words.
     """
 
     def __init__(
-        self, description: Description, inputs: Sequence[str], outputs: Sequence[str]
+        self,
+        description: Description,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        flags: Sequence[str] = (),
     ) -> None:
         import fmpy
 
@@ -75,7 +79,10 @@ class Slave:
         self.messages: list[str] = []
         self.input_names, self.output_names = tuple(inputs), tuple(outputs)
         self.inputs: Array = np.zeros(len(inputs))
+        self.flag_names = tuple(flags)
         self.outputs: Array = np.zeros(len(outputs))
+        boolean = ctypes.c_int if description.major == 2 else ctypes.c_bool
+        self.flags = np.zeros(len(flags), dtype=boolean)
         self._folder = fmpy.extract(str(description.path))
         self._fmu: Any = None
         try:
@@ -117,22 +124,35 @@ class Slave:
         """Fill `outputs`."""
         self.messages.clear()
         status = self._get(*self._get_arguments)
+        if self.flag_names and status <= _WARNING:
+            status = self._get_flags(*self._flag_arguments)
         if status > _WARNING:
             raise self._failure("read the outputs", status)
 
     def step(self, k: int, h: float) -> None:
         """Hold `inputs` over [k h, k h + h] and advance by h [s]."""
+        self.advance(k * h, h)
+
+    def advance(self, t: float, h: float) -> None:
+        """Hold `inputs` over [t, t + h], where the FMU stands at t, and advance by h [s]."""
         self.messages.clear()
         self._set_inputs()
-        self._time.value = k * h
+        self._time.value = t
         self._step_size.value = h
         status = self._do_step(*self._step_arguments)
         if status > _WARNING:
-            raise self._failure(f"step at t = {k * h:.6g} s", status)
+            raise self._failure(f"step at t = {t:.6g} s", status)
         if self._ended.value:
             raise FmuError(
-                f"{self.description.path.name}: ended the simulation at t = {k * h + h:.6g} s"
+                f"{self.description.path.name}: ended the simulation at t = {t + h:.6g} s"
             )
+
+    def reset(self) -> None:
+        """Go back to before initialisation."""
+        try:
+            self._fmu.reset()
+        except Exception as error:
+            raise self._failure("reset", error) from None
 
     def save(self) -> bytes:
         """Return the serialised FMU state; `FmuError` if the FMU cannot save it."""
@@ -180,7 +200,7 @@ class Slave:
             guid=model.guid,
             unzipDirectory=self._folder,
             modelIdentifier=model.coSimulation.modelIdentifier,
-            instanceName="vehicle",
+            instanceName=self.description.path.stem,
         )
         if self.description.major == 2:
             fmu.instantiate(callbacks=self._callbacks(), loggingOn=False)
@@ -219,7 +239,9 @@ class Slave:
         access = [pointer, pointer, size, pointer] + ([size] if major == 3 else [])
         self._get = self._function("fmi2GetReal" if major == 2 else "fmi3GetFloat64", access)
         self._put = self._function("fmi2SetReal" if major == 2 else "fmi3SetFloat64", access)
+        self._get_flags = self._function(f"fmi{major}GetBoolean", access)
         self._get_arguments = self._access(component, self.output_names, self.outputs)
+        self._flag_arguments = self._access(component, self.flag_names, self.flags)
         self._put_arguments = self._access(component, self.input_names, self.inputs)
         if major == 2:
             signature = [pointer, double, double, number]
@@ -241,7 +263,9 @@ class Slave:
         address = ctypes.cast(getattr(self._fmu.dll, name), ctypes.c_void_p).value
         return ctypes.CFUNCTYPE(ctypes.c_int, *arguments)(address or 0)
 
-    def _access(self, component: Any, names: Sequence[str], values: Array) -> tuple[Any, ...]:
+    def _access(
+        self, component: Any, names: Sequence[str], values: npt.NDArray[Any]
+    ) -> tuple[Any, ...]:
         references = np.array(
             [self.description.variables[name].valueReference for name in names], np.uint32
         )

@@ -40,6 +40,12 @@ TRUTH: Final = tuple(
     for output, corner in zip(OUTPUTS, CORNERS, strict=True)
 )  # fmt: skip
 
+ESTIMATE: Final = tuple(_own(o.name, o.unit, o.description) for o in OUTPUTS)
+ESTIMATE_DEVIATION: Final = tuple(
+    _own(f"VRel.Deviation.{c}", "m/s", f"standard deviation expected of the error {c}", False)
+    for c in CORNERS
+)
+
 POSE: Final = (
     _own("Car.tx", "m", "position of the centre of gravity, inertial x"),
     _own("Car.ty", "m", "position of the centre of gravity, inertial y"),

@@ -332,13 +332,12 @@ def resolved_yaml(scenario: Scenario) -> str:
     if scenario.vehicle.fmu != "builtin":
         data["vehicle"]["fmu"] = str(scenario.resolve(scenario.vehicle.fmu).resolve())
         del data["vehicle"]["fmi_version"]
+    for part in (data["sensor"], *data["controllers"]):
+        for kind in {"network", "fmu"} & part.keys():
+            part[kind] = str(scenario.resolve(part[kind]).resolve())
     for own, controller in zip(data["controllers"], scenario.controllers, strict=True):
-        if controller.network is not None:
-            own["network"] = str(scenario.resolve(controller.network).resolve())
         if getattr(controller, "fallback", None) is not None:
             del own["initial_command"]
-    if scenario.sensor.network is not None:
-        data["sensor"]["network"] = str(scenario.resolve(scenario.sensor.network).resolve())
     for fault in data["faults"]:
         if "file" in fault:
             fault["file"] = str(scenario.resolve(fault["file"]).resolve())

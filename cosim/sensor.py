@@ -22,8 +22,9 @@ def estimator_file(scenario: Scenario, settings: Sensor) -> Path | None:
     """Return the file of a sensor's network or estimator, None for an estimator without one;
     raises `NetworkError` where none is shipped.
     """
-    if settings.network is not None:
-        return scenario.resolve(settings.network)
+    file = settings.network or settings.fmu
+    if file is not None:
+        return scenario.resolve(file)
     try:
         return model_file(str(settings.estimator), settings.condition)
     except SensorError as error:
@@ -31,7 +32,13 @@ def estimator_file(scenario: Scenario, settings: Sensor) -> Path | None:
 
 
 def estimator_of(scenario: Scenario, settings: Sensor) -> Estimator:
-    """Return a sensor's estimator, fresh; raises `NetworkError` where its file does not fit."""
+    """Return a sensor's estimator, fresh; raises `NetworkError` or `FmuError` where its file does
+    not fit.
+    """
+    if settings.fmu is not None:
+        from cosim.sensor_fmu import FmuSensor
+
+        return FmuSensor(scenario.resolve(settings.fmu))
     try:
         if settings.network is None:
             return make(str(settings.estimator), settings.condition)

@@ -36,7 +36,7 @@ def test_the_own_binary_stays(fmus: dict[int, Path], tmp_path: Path) -> None:
 
 
 def test_the_smoke_test_runs_with_start_values() -> None:
-    said = cross.smoke(FIXTURE, None, [])
+    said = cross.smoke(FIXTURE, None, [], ["--lives=5"])
     assert said.startswith("FMI 2: ")
     assert len({line.partition(";")[2] for line in said.splitlines()}) == 1  # FMI 2 and 3 agree
 
@@ -45,6 +45,6 @@ def test_without_zig_one_sentence_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     monkeypatch.setattr(cross.importlib.util, "find_spec", lambda name: None)
-    monkeypatch.setattr(cross, "CACHE", tmp_path)
+    monkeypatch.setenv("COSIM_CACHE_DIR", str(tmp_path))
     assert cross.main(["--model", str(FIXTURE), "--out", str(tmp_path)]) == 2
     assert "pip install 'suspension-cosim[cross]'" in capsys.readouterr().err

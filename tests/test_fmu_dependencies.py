@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-import vehicle_fmus as fmus
+import shipped_fmus as fmus
 from vehicle_rig import INPUTS, cosine_bump, each, output_names, straight_road
 
 from cosim.fmi import Description, Slave, Value
@@ -20,12 +20,16 @@ from cosim.vehicle import builtin_fmu
 
 Array = npt.NDArray[np.float64]
 Start = dict[str, Value]
-KNOWNS = [v for v in fmus.variables(3).values() if v.causality in ("input", "parameter")]
+KNOWNS = [
+    v
+    for v in fmus.variables(fmus.Shipped("vehicle", 3)).values()
+    if v.causality in ("input", "parameter")
+]
 
 
 def listed(version: int, what: str) -> dict[str, set[str]]:
     """Dependencies by output, from the XML; every output has them."""
-    unknowns = getattr(fmus.description(version), what)
+    unknowns = getattr(fmus.description(fmus.Shipped("vehicle", version)), what)
     assert all(unknown.dependencies is not None for unknown in unknowns)
     return {u.variable.name: {v.name for v in u.dependencies} for u in unknowns}
 

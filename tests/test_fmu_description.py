@@ -1,4 +1,4 @@
-"""What the vehicle FMUs say of themselves: the XML of both FMI versions, as they are shipped."""
+"""What the FMUs say of themselves: the XML of vehicle and sensors, of both FMI versions."""
 
 from __future__ import annotations
 
@@ -10,17 +10,19 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
-import vehicle_fmus as fmus
+import shipped_fmus as fmus
 from fmpy.validation import validate_fmu
 from vehicle_rig import GAS, STEER, Rig, output_names
 
-from cosim.vehicle import builtin_fmu
-from sensor.channels import CHANNELS
+from sensor.channels import CHANNELS, OUTPUTS
 
-pytestmark = pytest.mark.parametrize("version", fmus.VERSIONS)
+every = pytest.mark.parametrize("fmu", fmus.ALL, ids=str)
+vehicles = pytest.mark.parametrize("fmu", fmus.VEHICLES, ids=str)
 
+COMMANDS = tuple(f"Car.SuspControl.Damper{corner}.CtrlOut" for corner in ("FL", "FR", "RL", "RR"))
 SI = {
     "1": "", "m": "m", "s": "s", "kg": "kg", "rad": "rad", "Hz": "/s", "N": "kg m /s/s",
     "J": "kg m m /s/s", "W": "kg m m /s/s/s",
@@ -53,24 +55,26 @@ def exponents(name: str) -> Counter[str]:
     return Counter({base: power for base, power in total.items() if power})
 
 
-def test_two_validators_find_nothing(version: int) -> None:
-    path = str(builtin_fmu(version))
+@every
+def test_two_validators_find_nothing(fmu: fmus.Shipped) -> None:
+    path = str(fmu.path)
     assert validate_fmu(path) == []
     tool = shutil.which("fmutool", path=str(Path(sys.executable).parent))
     assert tool, "fmu-manipulation-toolbox is part of the test extra"
     command = [tool, "-input", path, "-check"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     said = result.stdout + result.stderr
-    assert f"seems to be compliant with FMI-{version}.0" in said
-    assert f"No semantic error against the FMI-{version} standard" in said
+    assert f"seems to be compliant with FMI-{fmu.version}.0" in said
+    assert f"No semantic error against the FMI-{fmu.version} standard" in said
     assert "ERROR" not in said
     assert "WARNING" not in said
 
 
-def test_units_are_what_their_names_say(version: int) -> None:
+@every
+def test_units_are_what_their_names_say(fmu: fmus.Shipped) -> None:
     """SI exponents and factors, worked out from the names of units and display units."""
-    units = fmus.description(version).unitDefinitions
-    assert len(units) > 20
+    units = fmus.description(fmu).unitDefinitions
+    assert len(units) >= 6
     for unit in units:
         base = unit.baseUnit
         stated = {n: getattr(base, n) for n in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")}
@@ -82,40 +86,45 @@ def test_units_are_what_their_names_say(version: int) -> None:
             assert float(shown.factor) == pytest.approx(1.0 / in_si, rel=1e-15)
 
 
-def test_every_quantity_has_a_type(version: int) -> None:
-    types = {t.name: t for t in fmus.description(version).typeDefinitions}
+@every
+def test_every_quantity_has_a_type(fmu: fmus.Shipped) -> None:
+    types = {t.name: t for t in fmus.description(fmu).typeDefinitions}
     assert {t.quantity for t in types.values()} == set(types)
-    assert not set(types) & set(fmus.variables(version))
-    for variable in fmus.variables(version).values():
+    assert not set(types) & set(fmus.variables(fmu))
+    for variable in fmus.variables(fmu).values():
         if variable.type in ("Real", "Float64"):
             assert variable.declaredType is types[variable.declaredType.name]
             assert variable.declaredType.unit == variable.unit
 
 
-def test_limits_hold_their_start_values(version: int) -> None:
+@every
+def test_limits_hold_their_start_values(fmu: fmus.Shipped) -> None:
     limited = 0
-    for v in fmus.variables(version).values():
+    for v in fmus.variables(fmu).values():
         low = float(v.min) if v.min is not None else -math.inf
         high = float(v.max) if v.max is not None else math.inf
         assert low < high
         if v.start is not None and v.type in ("Real", "Float64"):
             assert low <= float(v.start) <= high, v.name
         limited += v.min is not None
-    assert limited > 100
-    pedals = {fmus.variables(version)[f"DM.{pedal}"] for pedal in ("Gas", "Brake")}
-    assert {(float(v.min), float(v.max)) for v in pedals} == {(0.0, 1.0)}
+    assert limited > (100 if fmu.model == "vehicle" else 13)
+    zero_to_one = {"vehicle": ("DM.Gas", "DM.Brake"), "carried": COMMANDS}.get(fmu.model, ())
+    for name in zero_to_one:
+        v = fmus.variables(fmu)[name]
+        assert (float(v.min), float(v.max)) == (0.0, 1.0)
 
 
-def test_nominal_values_are_of_the_size_of_the_outputs(version: int) -> None:
+@vehicles
+def test_nominal_values_are_of_the_size_of_the_outputs(fmu: fmus.Shipped) -> None:
     """Largest value of each output over a drive, against its own nominal value or its type's."""
     peak = np.zeros(len(output_names()))
-    with Rig({"Init.Velocity": 15.0}, version=version) as rig:
+    with Rig({"Init.Velocity": 15.0}, version=fmu.version) as rig:
         for k in range(300):
             rig.inputs[STEER], rig.inputs[GAS] = math.sin(0.03 * k), 0.5
             rig.step()
             np.maximum(peak, np.abs(rig.outputs), out=peak)
     for name, largest in zip(output_names(), peak, strict=True):
-        variable = fmus.variables(version)[name]
+        variable = fmus.variables(fmu)[name]
         nominal = float(variable.nominal or variable.declaredType.nominal or 1.0)
         assert 0.0 < nominal < 1e9
         assert largest < 1e3 * nominal, name
@@ -123,28 +132,39 @@ def test_nominal_values_are_of_the_size_of_the_outputs(version: int) -> None:
             assert largest > 1e-4 * nominal, name
 
 
-def test_the_default_experiment_runs(version: int) -> None:
-    experiment = fmus.description(version).defaultExperiment
+@pytest.mark.parametrize("fmu", fmus.SENSORS, ids=str)
+def test_the_default_experiment_of_a_sensor_runs(fmu: fmus.Shipped) -> None:
+    result = fmpy.simulate_fmu(str(fmu.path), validate=True, output=["VRel.FL", "Sensor.Valid"])
+    assert len(result) == 1001
+    assert np.isfinite(result["VRel.FL"]).all()
+    assert result["Sensor.Valid"][-1]
+
+
+@vehicles
+def test_the_default_experiment_runs(fmu: fmus.Shipped) -> None:
+    experiment = fmus.description(fmu).defaultExperiment
     start, stop = float(experiment.startTime), float(experiment.stopTime)
     step = float(experiment.stepSize)
     assert (start, step) == (0.0, 0.01)
     assert stop > 0.0
-    with Rig(version=version, h=step) as rig:
+    with Rig(version=fmu.version, h=step) as rig:
         for _ in range(round(stop / step)):
             rig.step()
         assert rig["Car.tz"] == pytest.approx(0.65, abs=1e-3)  # it stands where it stood
 
 
-def test_every_variable_is_described(version: int) -> None:
-    every = fmus.variables(version).values()
-    assert all(v.description and len(v.description) > 3 for v in every)
-    texts = Counter((v.causality, v.description) for v in every)
+@every
+def test_every_variable_is_described(fmu: fmus.Shipped) -> None:
+    known = fmus.variables(fmu).values()
+    assert all(v.description and len(v.description) > 3 for v in known)
+    texts = Counter((v.causality, v.description) for v in known)
     shared = [text for text, n in texts.items() if n > 1]
     assert shared == []
 
 
-def test_categories_and_description_of_the_whole(version: int) -> None:
-    root = fmus.xml(version)
+@every
+def test_categories_and_description_of_the_whole(fmu: fmus.Shipped) -> None:
+    root = fmus.xml(fmu)
     categories = root.findall("LogCategories/Category")
     assert {"logStatusError", "logStatusWarning"} <= {str(c.get("name")) for c in categories}
     assert all(c.get("description") for c in categories)
@@ -153,28 +173,34 @@ def test_categories_and_description_of_the_whole(version: int) -> None:
     assert root.get("variableNamingConvention") == "structured"
 
 
-def test_time_is_the_independent_variable(version: int) -> None:
-    time = fmus.variables(version)["time"]
+@every
+def test_time_is_the_independent_variable(fmu: fmus.Shipped) -> None:
+    time = fmus.variables(fmu)["time"]
     assert (time.causality, time.unit, time.start) == ("independent", "s", None)
-    assert sum(v.causality == "independent" for v in fmus.variables(version).values()) == 1
+    assert sum(v.causality == "independent" for v in fmus.variables(fmu).values()) == 1
 
 
-def test_terminals_name_channels_and_damper_commands(version: int) -> None:
-    """FMI 3.0; FMI 2.0.4 has taken terminals over."""
-    root = fmus.xml(version, "terminalsAndIcons/terminalsAndIcons.xml")
+@every
+def test_terminals_name_channels_commands_and_velocities(fmu: fmus.Shipped) -> None:
+    """FMI 3.0; FMI 2.0.4 has taken terminals over. Names are one for plug and socket."""
+    root = fmus.xml(fmu, "terminalsAndIcons/terminalsAndIcons.xml")
     members = {
         str(terminal.get("name")): [str(m.get("variableName")) for m in terminal]
         for terminal in root.findall("Terminals/Terminal")
     }
-    assert members["Channels"] == [channel.name for channel in CHANNELS]
-    assert len(members["Channels"]) == 14
-    assert members["DamperCommands"] == [
-        f"Car.SuspControl.Damper{corner}.CtrlOut" for corner in ("FL", "FR", "RL", "RR")
-    ]
+    channels, commands = [channel.name for channel in CHANNELS], list(COMMANDS)
+    velocities = [output.name for output in OUTPUTS]
+    wanted, side = {"Channels": channels, "DamperCommands": commands}, "output"
+    if fmu.model != "vehicle":
+        wanted, side = {**wanted, "SuspensionVelocities": velocities}, "input"
+    if fmu.model == "windowed":
+        del wanted["DamperCommands"]
+    assert members == wanted
     causalities = {
-        name: {fmus.variables(version)[m].causality for m in of} for name, of in members.items()
+        name: {fmus.variables(fmu)[m].causality for m in of} for name, of in members.items()
     }
-    assert causalities == {"Channels": {"output"}, "DamperCommands": {"input"}}
+    sides = {"Channels": side, "DamperCommands": "input", "SuspensionVelocities": "output"}
+    assert causalities == {name: {sides[name]} for name in wanted}
     for terminal in root.findall("Terminals/Terminal"):
         assert terminal.get("matchingRule") == "plug"
         assert terminal.get("terminalKind")

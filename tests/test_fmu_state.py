@@ -1,4 +1,4 @@
-"""States and instances of the vehicle FMUs: what is saved comes back bit for bit."""
+"""States and instances of the FMUs: what is saved comes back bit for bit."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import vehicle_fmus as fmus
-from fmu_face import Face, instances
+import shipped_fmus as fmus
+from fmu_face import Face, instances, refused
+from sensor_rig import Sensor
 from vehicle_rig import INPUTS, cosine_bump, output_names, straight_road
 
 Make = Callable[..., "Car"]
 Rows = list[tuple[float, ...]]
 H = 0.01
+WARM = 60  # samples
 
 
 class Car(Face):
@@ -58,16 +60,40 @@ def road(tmp_path_factory: pytest.TempPathFactory) -> str:
     return straight_road(path, lambda s, v: cosine_bump(s, 2.0, 3.0, 0.05) + 0.0 * v)
 
 
-@pytest.fixture(scope="module", params=fmus.VERSIONS, ids=["fmi2", "fmi3"])
-def folder(request: pytest.FixtureRequest) -> Iterator[Path]:
-    with fmus.unzipped(request.param) as path:
+@pytest.fixture(scope="module", params=(*fmus.VEHICLES, *fmus.SMALL), ids=str)
+def fmu(request: pytest.FixtureRequest) -> fmus.Shipped:
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def folder(fmu: fmus.Shipped) -> Iterator[Path]:
+    with fmus.unzipped(fmu) as path:
         yield path
 
 
+class WarmSensor(Sensor):
+    """A sensor that has warmed up when it starts: its estimates move from then on."""
+
+    def start(self, speed: float = 12.0) -> WarmSensor:
+        """Ready, after samples enough for every network; another speed is another drive."""
+        super().start()
+        super().drive(0, WARM, speed / 12.0)
+        return self
+
+    def drive(self, first: int, last: int, side: float = 1.0) -> Rows:
+        """All outputs after each of the steps after those of the start."""
+        return super().drive(WARM + first, WARM + last, side)
+
+
+def new(fmu: fmus.Shipped, folder: Path, road: str) -> Car | Sensor:
+    """An instance that can start and drive."""
+    return Car(folder, road) if fmu.model == "vehicle" else WarmSensor(folder)
+
+
 @pytest.fixture
-def make(folder: Path, road: str) -> Iterator[Make]:
-    with instances(Car, folder, road) as new:
-        yield new
+def make(fmu: fmus.Shipped, folder: Path, road: str) -> Iterator[Make]:
+    with instances(new, fmu, folder, road) as make_one:
+        yield make_one
 
 
 def test_a_saved_state_replays_bit_for_bit(make: Make) -> None:
@@ -94,7 +120,7 @@ def test_serialised_bytes_replay_bit_for_bit_elsewhere(make: Make) -> None:
 
 
 def test_serialised_bytes_replay_in_another_process(
-    make: Make, folder: Path, road: str, tmp_path: Path
+    make: Make, fmu: fmus.Shipped, folder: Path, road: str
 ) -> None:
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
@@ -103,13 +129,13 @@ def test_serialised_bytes_replay_in_another_process(
     car.drive(0, 20)
     data = car.serialize()
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        rows = pool.submit(replay, folder, road, data).result()
+        rows = pool.submit(replay, fmu, folder, road, data).result()
     assert rows == car.drive(20, 30)
 
 
-def replay(folder: Path, road: str, data: bytes) -> Rows:
+def replay(fmu: fmus.Shipped, folder: Path, road: str, data: bytes) -> Rows:
     """What a fresh process makes of serialised bytes."""
-    car = Car(folder, road)
+    car = new(fmu, folder, road)
     car.restore(data)
     rows = car.drive(20, 30)
     car.free()
@@ -159,13 +185,14 @@ def test_two_thousand_instances_leave_no_memory_behind(make: Make, folder: Path)
     if not Path("/proc/self/statm").exists():
         pytest.skip("needs /proc")
     car = make()
+    place, token = resources(folder, car.version), car.fmu.guid.encode()
     arguments: tuple[Any, ...]
     if car.version == 2:
         make_one, free = car.fmu.dll.fmi2Instantiate, car.fmu.dll.fmi2FreeInstance
-        arguments = (b"n", 1, car.fmu.guid.encode(), b"", None, 0, 0)
+        arguments = (b"n", 1, token, place, None, 0, 0)
     else:
         make_one, free = car.fmu.dll.fmi3InstantiateCoSimulation, car.fmu.dll.fmi3FreeInstance
-        arguments = (b"n", car.fmu.guid.encode(), b"", *[False] * 4, None, 0, None, None, None)
+        arguments = (b"n", token, place, *[False] * 4, None, 0, None, None, None)
     make_one = ctypes.CFUNCTYPE(ctypes.c_void_p)(ctypes.cast(make_one, ctypes.c_void_p).value)
     free = ctypes.CFUNCTYPE(None)(ctypes.cast(free, ctypes.c_void_p).value)
     before = 0
@@ -178,7 +205,31 @@ def test_two_thousand_instances_leave_no_memory_behind(make: Make, folder: Path)
         car.serialize()
         car.fmu.component = keep
         free(component)
-    assert resident() - before < 2_000_000  # an instance alone has 20 kB
+    assert resident() - before < 2_000_000  # an instance alone has 15 kB and more
+
+
+def resources(folder: Path, version: int) -> bytes:
+    """Where an instance finds its resources, as its version of FMI says it."""
+    path = folder / "resources"
+    return path.as_uri().encode() if version == 2 else f"{path}/".encode()
+
+
+def test_the_state_of_another_network_is_refused(folder: Path, fmu: fmus.Shipped) -> None:
+    """Its bytes may be as many: the token tells them apart."""
+    if fmu.model == "vehicle":
+        pytest.skip("there is one vehicle")
+    other = fmus.Shipped(fmu.model.removeprefix("small "), fmu.version)
+    with (
+        fmus.unzipped(other) as path,
+        instances(Sensor, folder) as make_one,
+        instances(Sensor, path) as make_another,
+    ):
+        one, another = make_one(), make_another().start()
+        assert one.fmu.guid != another.fmu.guid
+        data = another.serialize()
+        assert "not a serialised state" in refused(one, lambda: one.restore(data))
+        with pytest.raises(Exception, match="instantiate"):
+            make_one(token=another.fmu.guid)
 
 
 def as_argument(value: Any) -> Any:

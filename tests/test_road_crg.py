@@ -13,8 +13,8 @@ import pytest
 from gates import at_most, gate
 from road_reader import Reader, compile_reader, load_library
 
+from cosim.cache import default_cache_dir
 from cosim.road import Iso8608, RoadError, Smooth, Track, build_road, load_track
-from cosim.road.build import default_cache_dir
 
 
 @pytest.fixture(scope="module")

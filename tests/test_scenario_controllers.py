@@ -78,7 +78,7 @@ def test_an_estimator_of_a_run_is_checked_like_the_scenarios(tmp_path: Path) -> 
     found = problems(tmp_path, "[{kind: passive}, {kind: skyhook, network: gone.onnx}]")
     assert "controllers.1.network: there is no file" in found
     both = "[{kind: skyhook, estimator: zero, network: gone.onnx}]"
-    assert "give either an estimator or a network" in problems(tmp_path, both)
+    assert "give either an estimator, a network or an FMU" in problems(tmp_path, both)
 
 
 def test_two_runs_of_one_name_need_names(tmp_path: Path) -> None:

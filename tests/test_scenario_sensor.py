@@ -53,12 +53,16 @@ def test_a_wrong_name_gets_the_nearest_right_one(tmp_path: Path) -> None:
     assert "'estimatr' is not a field of sensor" in problems(tmp_path, "{estimatr: zero}")[0]
 
 
-def test_an_estimator_or_a_network_not_both(tmp_path: Path) -> None:
-    for both in ("{estimator: zero, network: n.onnx}", "{estimator: }"):
-        assert "give either an estimator or a network" in " ".join(problems(tmp_path, both))
-    found = problems(tmp_path, "{network: gone.onnx}")
-    assert len(found) == 1
-    assert "there is no file" in found[0]
+def test_an_estimator_or_a_file_not_several(tmp_path: Path) -> None:
+    several = ("{estimator: zero, network: n.onnx}", "{network: n.onnx, fmu: s.fmu}")
+    for wrong in (*several, "{estimator: zero, fmu: s.fmu}", "{estimator: }"):
+        said = " ".join(problems(tmp_path, wrong))
+        assert "give either an estimator, a network or an FMU" in said
+    for gone in ("{network: gone.onnx}", "{fmu: gone.fmu}"):
+        found = problems(tmp_path, gone)
+        assert len(found) == 1
+        assert "there is no file" in found[0]
+    assert "must be a sensor FMU (.fmu), not 'n.onnx'" in problems(tmp_path, "{fmu: n.onnx}")[0]
 
 
 def test_a_network_takes_the_estimator_s_place(tmp_path: Path) -> None:

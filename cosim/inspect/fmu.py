@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from pathlib import Path
 from typing import Any, Final
@@ -11,21 +12,13 @@ from cosim.check.binaries import meaning, platforms
 from cosim.check.contents import TERMINALS
 from cosim.check.description import Description
 from cosim.check.finding import listed
-from cosim.check.parts import Unit, Variable
+from cosim.check.parts import Variable
 from cosim.check.schema import XmlError, parse
-from cosim.check.unit_names import DIMENSIONS, readings
-from cosim.errors import InputError, did_you_mean
+from cosim.errors import InputError
 from cosim.inspect.facts import Facts, number, size_of
-from cosim.quantities import CHANNEL_QUANTITIES, DAMPERS, DRIVER, POSE, RIDE, TRUTH, Quantity
+from cosim.inspect.service import service, show_service
 
-GROUPS: Final[dict[str, tuple[tuple[Quantity, ...], str]]] = {
-    "sensor channels": (CHANNEL_QUANTITIES, "output"),
-    "true suspension velocities": (TRUTH, "output"),
-    "position": (POSE, "output"),
-    "ride": (RIDE, "output"),
-    "driver": (DRIVER, "input"),
-    "damper commands": (DAMPERS, "input"),
-}
+NETWORK_RECORD: Final = "extra/org.suspension-cosim/network.json"
 LISTS: Final = {
     "Inputs": ("input",), "Outputs": ("output",),
     "Parameters": ("parameter", "structuralParameter"),
@@ -59,7 +52,8 @@ def inspect(path: Path, limit: int = 0) -> Facts:
         for t in data["terminals"]
     ]
     facts.table("Terminals", ("name", "kind", "members", "variables"), terminals, limit)
-    _service(facts)
+    _network(facts)
+    show_service(facts)
     return facts
 
 
@@ -125,7 +119,8 @@ def _data(archive: Archive, description: Description) -> dict[str, Any]:
             for name in archive.below(folder)
         ],
         "sources": len([n for n in archive.below("sources") if n.endswith((".c", ".cpp"))]),
-        "serves": _serves(description),
+        "serves": service(description),
+        "network": _record(archive),
     }  # fmt: skip
 
 
@@ -193,6 +188,27 @@ def _identity(facts: Facts) -> None:
     )
 
 
+def _record(archive: Archive) -> dict[str, Any]:
+    """Return what a packed sensor (cosim pack) says of its network, {} of any other FMU."""
+    if NETWORK_RECORD not in archive:
+        return {}
+    try:
+        found = json.loads(archive.read(NETWORK_RECORD))
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _network(facts: Facts) -> None:
+    """The record without what its file says of the training: inspect the ONNX file for that."""
+    plain = [
+        (key.replace("_", " "), str(value))
+        for key, value in facts.data["network"].items()
+        if isinstance(value, str | int | float)
+    ]
+    facts.pairs("Network", plain)
+
+
 def _row(v: dict[str, Any]) -> tuple[str, ...]:
     start = v["start"] if isinstance(v["start"], str) else listed(v["start"] or [], 4)
     elements = f"[{v['elements']}]" if v["elements"] != 1 else ""
@@ -200,51 +216,3 @@ def _row(v: dict[str, Any]) -> tuple[str, ...]:
         v["name"], v["type"] + elements, v["unit"] or "", start, number(v["min"]),
         number(v["max"]), v["description"],
     )  # fmt: skip
-
-
-# ---------------------------------------------------------------- what the test bench needs
-
-
-def _serves(description: Description) -> dict[str, dict[str, str]]:
-    """Say of every quantity of the test bench whether the FMU has it under its own name."""
-    units = {unit.name: unit for unit in description.units}
-    return {
-        group: {q.name: _answer(q, causality, description, units) for q in quantities}
-        for group, (quantities, causality) in GROUPS.items()
-    }
-
-
-def _answer(q: Quantity, causality: str, description: Description, units: dict[str, Unit]) -> str:
-    v = description.by_name.get(q.variable)
-    if v is None:
-        hint = did_you_mean(q.variable, [o.name for o in description.variables
-                                         if o.causality == causality])  # fmt: skip
-        return f"missing{hint}"
-    if v.causality != causality:
-        return f"is of causality {v.causality}"
-    if v.unit is None:
-        return "yes, without a unit"
-    wanted = readings(q.unit)[0].exponents
-    unit = units.get(v.unit)
-    found = None
-    if unit is not None and unit.exponents is not None:
-        found = tuple(unit.exponents[d] for d in DIMENSIONS)
-    if found is not None and found[:7] != wanted[:7]:
-        return f"of another kind: {v.unit} instead of {q.unit}"
-    return "yes" if v.unit == q.unit else f"yes, converted from {v.unit}"
-
-
-def _service(facts: Facts) -> None:
-    rows, wrong = [], []
-    for group, answers in facts.data["serves"].items():
-        have = [a for a in answers.values() if a.startswith("yes")]
-        rows.append((group, f"{len(have)} of {len(answers)}", _lacking(answers)))
-        wrong += [f"{n} {a}" for n, a in answers.items() if a.startswith(("of", "is"))]
-    facts.table("Serves the test bench under its own names", ("what", "has", "lacks"), rows)
-    facts.notes += wrong
-    if any(not a.startswith("yes") for g in facts.data["serves"].values() for a in g.values()):
-        facts.notes.append("other names are mapped by vehicle.variables of a scenario")
-
-
-def _lacking(answers: dict[str, str]) -> str:
-    return listed([n for n, a in answers.items() if not a.startswith("yes")], 6)

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from uuid import uuid4
 
+from cosim.cache import default_cache_dir
 from cosim.road.crg import WRITER_VERSION, write_crg
 from cosim.road.errors import RoadError
 from cosim.road.grid import road_grid
 from cosim.road.obstacles import Obstacle
 from cosim.road.surface import Surface
 from cosim.road.track import Track
-
-
-def default_cache_dir() -> Path:
-    """Return the directory named by COSIM_CACHE_DIR, or ~/.cache/suspension-cosim."""
-    named = os.environ.get("COSIM_CACHE_DIR")
-    return Path(named) if named else Path.home() / ".cache" / "suspension-cosim"
 
 
 def build_road(

@@ -32,6 +32,11 @@ class OneRun(Model):
         min_length=1,
         description="ONNX file, relative to the scenario, that takes the sensor's place",
     )
+    fmu: str | None = Field(
+        default=None,
+        min_length=1,
+        description="sensor FMU, relative to the scenario, that takes the sensor's place",
+    )
     latency: Latency | None = Field(
         default=None, description="latencies of this run; the scenario's if not given"
     )
@@ -43,18 +48,28 @@ class OneRun(Model):
 
     def sensor_of_run(self, shared: Sensor) -> Sensor:
         """Return the sensor of this run: the scenario's, or with this controller's estimator."""
-        if self.estimator is None and self.network is None:
+        if not self._own:
             return shared
-        return Sensor(estimator=self.estimator, network=self.network, condition=shared.condition)
+        return Sensor(
+            estimator=self.estimator,
+            network=self.network,
+            fmu=self.fmu,
+            condition=shared.condition,
+        )
+
+    @property
+    def _own(self) -> list[str]:
+        """What is given in the sensor's place."""
+        return [given for given in (self.estimator, self.network, self.fmu) if given]
 
     def latency_of_run(self, shared: Latency) -> Latency:
         """Return the latencies of this run: its own, or the scenario's."""
         return shared if self.latency is None else self.latency
 
     @model_validator(mode="after")
-    def _not_both(self) -> OneRun:
-        if self.estimator is not None and self.network is not None:
-            raise PydanticCustomError("sensor", "give either an estimator or a network")
+    def _not_several(self) -> OneRun:
+        if len(self._own) > 1:
+            raise PydanticCustomError("sensor", "give either an estimator, a network or an FMU")
         return self
 
 

@@ -22,14 +22,19 @@ from cosim.scenario.variants import combine
 from sensor.paper import paper_rows
 
 _NETWORK: Final = (".onnx", "an ONNX network")
+_SENSOR_FMU: Final = (".fmu", "a sensor FMU")
 FileField = tuple[Key, str | None, str, str]
 # Fields that name a file, the word that needs none, and the ending that the file must have.
 FILE_FIELDS: Final[tuple[FileField, ...]] = (
     (("road", "file"), None, ".crg", "an OpenCRG road"),
     (("vehicle", "fmu"), "builtin", ".fmu", "an FMU"),
     (("sensor", "network"), None, *_NETWORK),
+    (("sensor", "fmu"), None, *_SENSOR_FMU),
 )
-CONTROLLER_FILE_FIELDS: Final[tuple[FileField, ...]] = ((("network",), None, *_NETWORK),)
+CONTROLLER_FILE_FIELDS: Final[tuple[FileField, ...]] = (
+    (("network",), None, *_NETWORK),
+    (("fmu",), None, *_SENSOR_FMU),
+)
 
 
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:

@@ -27,7 +27,7 @@ EstimatorName = Annotated[str, BeforeValidator(_check_estimator)]
 
 
 class Sensor(Model):
-    """The virtual sensor: an estimator by name, or a network from a file."""
+    """The virtual sensor: an estimator by name, or a network or a sensor FMU from a file."""
 
     estimator: Annotated[str | None, BeforeValidator(_check_estimator)] = Field(
         default=DEFAULT,
@@ -39,6 +39,12 @@ class Sensor(Model):
         min_length=1,
         description="instead of an estimator, an ONNX file relative to the scenario file",
     )
+    fmu: str | None = Field(
+        default=None,
+        min_length=1,
+        description="instead of an estimator, a sensor FMU (cosim pack) relative to the scenario "
+        "file",
+    )
     condition: Literal["ideal", "production"] = Field(
         default="ideal",
         description="how the channels are measured: exactly, or by a car's sensors",
@@ -46,14 +52,16 @@ class Sensor(Model):
 
     @model_validator(mode="before")
     @classmethod
-    def _network_instead(cls, data: Any) -> Any:
-        """A network stands in the default estimator's place, not beside it."""
-        if isinstance(data, dict) and data.get("network") is not None and "estimator" not in data:
-            return {**data, "estimator": None}
-        return data
+    def _file_instead(cls, data: Any) -> Any:
+        """A network or an FMU stands in the default estimator's place, not beside it."""
+        if not isinstance(data, dict) or "estimator" in data:
+            return data
+        given = data.get("network") is not None or data.get("fmu") is not None
+        return {**data, "estimator": None} if given else data
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> Sensor:
-        if (self.estimator is None) == (self.network is None):
-            raise PydanticCustomError("sensor", "give either an estimator or a network")
+    def _one_of_them(self) -> Sensor:
+        given = [choice for choice in (self.estimator, self.network, self.fmu) if choice]
+        if len(given) != 1:
+            raise PydanticCustomError("sensor", "give either an estimator, a network or an FMU")
         return self

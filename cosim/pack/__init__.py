@@ -1,0 +1,1 @@
+"""`cosim pack`: a trained network as an FMU that needs nothing but its importer."""
