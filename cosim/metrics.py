@@ -58,7 +58,7 @@ RUN_FIGURES: Final = (
     "valid_samples",
 )
 FAULT_PARTS: Final = ("before", "during", "after")
-"""Parts of the run that the figures of a fault are of; `after` is 5 s long."""
+"""Parts of the run that the figures of a fault are of; 5 s before and after it."""
 FAULT_FIGURES: Final = ("rmse_m_s", "valid_percent", "covered_percent")
 STEP_TIMES: Final = ("step_p50_ms", "step_p99_ms", "step_max_ms")
 LATENESS: Final = ("lateness_p50_ms", "lateness_p99_ms", "lateness_max_ms", "overruns")

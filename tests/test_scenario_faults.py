@@ -189,16 +189,14 @@ def test_the_same_seed_gives_the_same_files_and_another_one_does_not(tmp_path: P
 def test_figures_are_of_the_rows_before_during_and_after(tmp_path: Path) -> None:
     outcome = run(
         tmp_path,
-        faults="[{kind: gain, channels: imu, factor: -1, start_s: 0.5, end_s: 0.7}]",
-        duration="2",
+        faults="[{kind: bias, name: hit, channels: Car.az, value: 20, start_s: 6, end_s: 6.2}]",
+        duration="13",
+        road=f"{{track: straight, length_m: 250, obstacles: [{BUMPS}]}}",
     )
-    record, found = outcome.runs[0].recorder, outcome.runs[0].figures["faults"]["gain"]
+    record, found = outcome.runs[0].recorder, outcome.runs[0].figures["faults"]["hit"]
     error = record.group("estimate") - record.group("truth")
-    for part, rows in (
-        ("before", slice(0, 50)),
-        ("during", slice(50, 70)),
-        ("after", slice(70, 201)),
-    ):
+    parts = {"before": slice(100, 600), "during": slice(600, 620), "after": slice(620, 1120)}
+    for part, rows in parts.items():
         valid = record.group("valid")[rows, 0] > 0
         assert found[part]["valid_percent"] == pytest.approx(100 * valid.mean())
         expected = np.sqrt(np.mean(error[rows][valid] ** 2))

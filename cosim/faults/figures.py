@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.bool_]
 
-AFTER_S: Final = 5.0
-"""How long after its end a fault is still looked at [s]."""
+AROUND_S: Final = 5.0
+"""How long before its start and after its end a fault is looked at [s]."""
 BAND: Final = 1.645  # deviations that 90 % of a normal distribution lie within
 
 
@@ -32,8 +32,8 @@ def windows(entry: Acting) -> list[Window]:
 def fault_figures(
     acting: Sequence[Acting], recorder: Recorder
 ) -> dict[str, dict[str, Mapping[str, float]]]:
-    """Return the sensor's figures by fault and by part of the run: `before` the fault, `during` and
-    `after` it, for `AFTER_S`. Parts without a row are left out.
+    """Return the sensor's figures by fault and by part of the run: `AROUND_S` `before` the fault,
+    `during` it, and as long `after` it. Parts without a row are left out.
 
     `recorder` has the groups estimate, deviation, valid and truth. `rmse_m_s` and `covered_percent`
     (errors within 1.645 predicted deviations) are of valid rows, `valid_percent` is the share of
@@ -56,9 +56,10 @@ def parts(acting: Sequence[Window], rows: int) -> dict[str, Rows]:
         return found
     for window in acting:
         found["during"][window.first : window.stop] = True
-    found["before"][: min(window.first for window in acting)] = True
-    end = max(window.stop for window in acting)
-    found["after"][end : end + round(AFTER_S * SAMPLE_RATE_HZ)] = True
+    around = round(AROUND_S * SAMPLE_RATE_HZ)
+    start, end = min(w.first for w in acting), max(w.stop for w in acting)
+    found["before"][max(start - around, 0) : start] = True
+    found["after"][end : end + around] = True
     return found
 
 

@@ -22,8 +22,8 @@ _COLUMNS: Final = (
     "fault", "channels", "time [s]", *FAULT_PARTS, "valid during [%]", "covered during [%]",
 )  # fmt: skip
 _NOTE: Final = (
-    "Error over all wheels in the samples that count: before the fault, during it, and in the 5 s "
-    "after it. Covered: errors within 1.645 predicted deviations, 90 % of a normal distribution."
+    "Error over all wheels in the samples that count: 5 s before the fault, during it, 5 s after. "
+    "Covered: errors within 1.645 predicted deviations, 90 % of a normal distribution."
 )
 
 
