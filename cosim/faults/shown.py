@@ -40,7 +40,7 @@ def fault_table(
         shares = (
             number(figure(found, f"during.{name}_percent"), 1) for name in ("valid", "covered")
         )
-        rows.append((entry.label, ", ".join(names(entry)), _times(entry), *errors, *shares))
+        rows.append((entry.label, ", ".join(names(entry)), times(entry), *errors, *shares))
     title = "RMSE of the estimate around each fault [m/s]" + (f", {run}" if run else "")
     return Table(title, _COLUMNS, tuple(rows), _NOTE)
 
@@ -48,6 +48,16 @@ def fault_table(
 def names(entry: Acting) -> list[str]:
     """Return the channels and groups that an entry acts on, as the scenario names them."""
     return list(dict.fromkeys(name for fault in entry.faults for name in _names(fault)))
+
+
+def times(entry: Acting) -> str:
+    """Return from when to when an entry acts, in words, in s."""
+    starts = [fault.start_s for fault in entry.faults]
+    ends = [sys.float_info.max if f.end_s is None else f.end_s for f in entry.faults]
+    if not starts:
+        return "-"
+    end = "end" if max(ends) == sys.float_info.max else f"{max(ends):g}"
+    return f"{min(starts):g} to {end}"
 
 
 def spans(acting: Sequence[Acting], rows: int, step_s: float) -> list[tuple[float, float]]:
@@ -103,12 +113,3 @@ def _names(fault: PlainFault) -> Sequence[str]:
     if isinstance(fault, SwappedWheels):
         return [f"Car.v{wheel}" for wheel in fault.wheels]
     return fault.channels
-
-
-def _times(entry: Acting) -> str:
-    starts = [fault.start_s for fault in entry.faults]
-    ends = [sys.float_info.max if f.end_s is None else f.end_s for f in entry.faults]
-    if not starts:
-        return "-"
-    end = "end" if max(ends) == sys.float_info.max else f"{max(ends):g}"
-    return f"{min(starts):g} to {end}"
