@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -60,3 +61,11 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
 def version(request: pytest.FixtureRequest) -> int:
     """The major version of FMI."""
     return int(request.param)
+
+
+@pytest.fixture(scope="session")
+def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    """The C sensor, without FMI, as a shared library, compiled once."""
+    from packed_sensor import compile_sensor, load_library
+
+    return load_library(compile_sensor(tmp_path_factory.mktemp("sensor") / "sensor.so"))

@@ -60,6 +60,14 @@ def load_library(path: Path) -> ctypes.CDLL:
     return library
 
 
+def kernels(library: ctypes.CDLL) -> list[str]:
+    """Return the kernels that this machine can run, best first."""
+    names = ("avx512", "avx2", "sse2", "neon", "portable")
+    found = [name for name in names if library.network_choose_kernel(name.encode())]
+    library.network_choose_kernel(found[0].encode())
+    return found
+
+
 def aligned(size: int, offset: int = 0) -> npt.NDArray[np.uint8]:
     """Return zeroed bytes that begin `offset` bytes behind a multiple of 64."""
     room = np.zeros(size + 2 * ALIGNMENT, dtype=np.uint8)

@@ -6,7 +6,8 @@
 
 /* Units of an LSTM come in blocks of 16, the sums of a block's gates as
  * [i 0-7][f 0-7][g 0-7][o 0-7][i 8-15][f 8-15][g 8-15][o 8-15]. */
-enum { BLOCK = 64, BLOCK_UNITS = 16 };
+#define BLOCK 64
+#define BLOCK_UNITS 16
 
 /* Several states of one LSTM, row by row. */
 typedef struct {
@@ -26,10 +27,26 @@ typedef struct Kernel {
     void (*begin)(size_t blocks, const float *gates, float *hidden, float *cell);
     /* One LSTM step of all rows, from sums that begin with `start` (which serves all rows) in place of the layer's. */
     void (*advance)(const Layer *layer, const float *start, const Rows *rows);
-    /* tanh of each value; the count is a multiple of 16 */
+    /* tanh and 1 / (1 + exp(-x)) of each value; the count is a multiple of 16 */
     void (*bend)(size_t count, float *values);
+    void (*open)(size_t count, float *values);
 } Kernel;
 
 const Kernel *best_kernel(void);
+
+/* GCC keeps no stack aligned to 32 bytes on Windows (its bug 54412), so that wide registers cannot be saved there. */
+#if defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && !defined(_WIN32)))
+#define KERNELS_WIDE
+extern const Kernel KERNEL_AVX512, KERNEL_AVX2;
+#endif
+#if defined(__SSE2__) || defined(_M_X64)
+#define KERNELS_SSE2
+extern const Kernel KERNEL_SSE2;
+#endif
+#if defined(__aarch64__) && defined(__ARM_NEON)
+#define KERNELS_NEON
+extern const Kernel KERNEL_NEON;
+#endif
+extern const Kernel KERNEL_PORTABLE;
 
 #endif

@@ -31,7 +31,8 @@ static const char *fault(const Header *h, const void *blob, size_t bytes) {
     if (h->byte_order != 0x01020304u) return "The packed network was written for the other byte order.";
     if (h->version != PACKED_VERSION) return "The packed network is of another version than this sensor: pack it again.";
     if (h->bytes != bytes) return "The packed network has been cut short or prolonged.";
-    if (crc32((const unsigned char *)blob + sizeof *h, bytes - sizeof *h) != h->checksum) return "The packed network's bytes have been changed: its checksum is wrong.";
+    if (crc32((const unsigned char *)&h->kind, bytes - offsetof(Header, kind)) != h->checksum)
+        return "The packed network's bytes have been changed: its checksum is wrong.";
     if (h->kind > CARRIED || !between(h->units, 1, MOST_UNITS) || !between(h->hidden, 1, MOST_UNITS)) return "The packed network has a shape that cannot be.";
     if (h->kind == WINDOWED ? !between(h->window, 2, MOST_SAMPLES) : !between(h->front_units, 1, MOST_UNITS) || !between(h->leads, 1, MOST_SAMPLES) || !between(h->depth, 4, MOST_SAMPLES))
         return "The packed network has a shape that cannot be.";

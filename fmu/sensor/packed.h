@@ -11,7 +11,7 @@ enum { LINE = 10, MEANS = 7, INTEGRALS = 3, DELAYED = 5, MOVING = MEANS + INTEGR
 typedef struct {
     char magic[8];
     uint32_t byte_order, version;
-    uint32_t bytes, checksum; /* of the file; CRC-32 of what follows the header */
+    uint32_t bytes, checksum; /* of the file; CRC-32 of all that follows this number */
     uint32_t kind, window, units, hidden, residual;
     uint32_t front_units, leads, depth, warm_up, spare;
 } Header;

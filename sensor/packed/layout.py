@@ -43,13 +43,13 @@ def blob(network: PackedNetwork) -> bytes:
     content = b"".join(_filled(section) for section in sections)
     carried = network.kind == "carried"
     depth = int(network.arrays["depth"]) if carried else 0
-    head = struct.pack(
-        "<8s14I",
-        *(MAGIC, BYTE_ORDER, VERSION, ALIGNMENT + len(content), zlib.crc32(content)),
+    rest = struct.pack(
+        "<10I",
         *(carried, 0 if carried else network.window, network.units, network.hidden),
         *(network.residual, network.front, network.leads, depth, _warm_up(network), 0),
     )
-    return head + content
+    size, checksum = ALIGNMENT + len(content), zlib.crc32(content, zlib.crc32(rest))
+    return struct.pack("<8s4I", MAGIC, BYTE_ORDER, VERSION, size, checksum) + rest + content
 
 
 def _warm_up(network: PackedNetwork) -> int:

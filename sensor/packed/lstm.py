@@ -15,11 +15,7 @@ from sensor.packed.standardisation import take_standardisation
 Array = npt.NDArray[Any]
 
 _ACTIVATIONS: Final = ("Sigmoid", "Tanh", "Tanh")
-_KEEP: Final = [
-    0,
-    1,
-    3,
-]  # the backward cell's input, output and cell gate; it has nothing to forget
+_KEEP: Final = [0, 3, 1]  # the backward cell: input, cell and output gate, nothing to forget
 
 
 class Lstm:
