@@ -42,6 +42,7 @@ class Result:
     manoeuvre: Mapping[str, Any] = field(default_factory=dict)
     grip: Mapping[str, Any] = field(default_factory=dict)
     timing: Mapping[str, Any] = field(default_factory=lambda: {"step_p99_ms": 0.7})
+    bus: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass

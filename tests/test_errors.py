@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim.errors import (
+    BusError,
     CosimError,
     FmuError,
     InputError,
@@ -17,12 +18,14 @@ from cosim.errors import (
 
 
 def test_one_tree_with_the_documented_exit_codes():
-    assert {error: error.exit_code for error in (InputError, FmuError, NetworkError)} == {
+    errors = (InputError, FmuError, NetworkError, BusError)
+    assert {error: error.exit_code for error in errors} == {
         InputError: 2,
         FmuError: 3,
         NetworkError: 3,
+        BusError: 3,
     }
-    assert all(issubclass(error, CosimError) for error in (InputError, FmuError, NetworkError))
+    assert all(issubclass(error, CosimError) for error in errors)
 
 
 def test_an_input_error_shows_every_problem_with_place_line_and_caret():
