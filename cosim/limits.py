@@ -3,19 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+import numpy.typing as npt
+
 from cosim.errors import did_you_mean
-from cosim.metrics import LATENESS, MANOEUVRE_FIGURES, figure, metric_names, with_unit
+from cosim.metrics import LATENESS, MANOEUVRE_FIGURES, figure, metric_names
+from cosim.recorder import Recorder
+from cosim.signal_statistics import Statistic, statistic, worst
+from cosim.verdict import Verdict
+
+Array = npt.NDArray[np.float64]
 
 
 class Bounds(Protocol):
     """What a limit asks for; `cosim.scenario.limit.Limit` is one."""
 
     @property
-    def metric(self) -> str:
-        """Dotted path of the figure."""
+    def metric(self) -> str | None:
+        """Dotted path of the figure, None for a limit on a signal."""
+
+    @property
+    def signal(self) -> str | None:
+        """Name of the signal, None for a limit on a figure."""
+
+    @property
+    def statistic(self) -> Statistic:
+        """What of the signal is bounded."""
+
+    @property
+    def from_s(self) -> float | None:
+        """Where the signal's window begins [s], None for its beginning."""
+
+    @property
+    def to_s(self) -> float | None:
+        """Where the signal's window ends [s], None for its end."""
 
     @property
     def min(self) -> float | None:
@@ -33,40 +56,9 @@ class Bounds(Protocol):
 L = TypeVar("L", bound=Bounds)
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """One limit in one run. `value` is None where the run has no such figure, which fails;
-    `surface` is the one that the limit is made for.
-    """
-
-    run: str
-    metric: str
-    value: float | None
-    min: float | None
-    max: float | None
-    passed: bool
-    surface: str | None = None
-
-    @property
-    def required(self) -> str:
-        """What was asked for, in words."""
-        low = f"at least {with_unit(self.min, self.metric)}" if self.min is not None else ""
-        high = f"at most {with_unit(self.max, self.metric)}" if self.max is not None else ""
-        on = f" (surface {self.surface})" if self.surface is not None else ""
-        return " and ".join(words for words in (low, high) if words) + on
-
-    @property
-    def measured(self) -> str:
-        """What was found, in words."""
-        return "not available" if self.value is None else with_unit(self.value, self.metric)
-
-    def __str__(self) -> str:
-        outcome = "passed" if self.passed else "FAILED"
-        return f"{outcome}: {self.run}: {self.metric} is {self.measured}, required {self.required}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the verdict as it stands in metrics.json."""
-        return asdict(self)
+def run_of(limit: Bounds) -> str:
+    """Return what a limit begins with: the name of a run, if it is for one alone."""
+    return str(limit.metric or limit.signal).partition(".")[0]
 
 
 def check_metric(
@@ -84,6 +76,18 @@ def check_metric(
         return f"'{metric}' is a figure of the manoeuvre {kinds}, {here}"
     hint = did_you_mean(metric, names)
     return f"'{metric}' is not a metric{hint or ', such as sensor.overall.accuracy_percent'}"
+
+
+def check_signal(name: str, labels: Sequence[str], signals: Sequence[str]) -> str | None:
+    """Return what is wrong with the name of a signal, with or without that of a run before it, or
+    None.
+    """
+    label, _, rest = name.partition(".")
+    wanted = rest if label in labels else name
+    if wanted in signals:
+        return None
+    hint = did_you_mean(wanted, signals)
+    return f"'{wanted}' is not a recorded signal{hint or ', such as Car.az'}"
 
 
 def _kinds_of(metric: str, labels: Sequence[str]) -> str:
@@ -113,28 +117,88 @@ def counted(
     return [limit for limit in here if limit not in late], tuple(notes)
 
 
-def _is_lateness(metric: str) -> bool:
-    return any(metric.endswith(f"timing.{name}") for name in LATENESS)
+def _is_lateness(metric: str | None) -> bool:
+    return metric is not None and any(metric.endswith(f"timing.{name}") for name in LATENESS)
 
 
 def _number(limits: Sequence[object]) -> str:
     return "1 limit is" if len(limits) == 1 else f"{len(limits)} limits are"
 
 
-def evaluate(limits: Iterable[Bounds], runs: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
-    """Return one verdict per limit and run, or for one run where the limit begins with its name."""
+def evaluate(
+    limits: Iterable[Bounds],
+    runs: Mapping[str, Mapping[str, Any]],
+    records: Mapping[str, Recorder] | None = None,
+) -> list[Verdict]:
+    """Return one verdict per limit and run, or for one run where the limit begins with its name.
+
+    `runs` are the figures of each run, `records` what was recorded of it.
+    """
     verdicts = []
     for limit in limits:
-        label, _, rest = limit.metric.partition(".")
-        chosen = {label: rest} if label in runs else dict.fromkeys(runs, limit.metric)
-        for run, path in chosen.items():
-            value = figure(runs[run], path)
-            # A comparison with NaN is false, so a figure that is not a number fails.
-            passed = value is not None and (
-                (limit.min is None or value >= limit.min)
-                and (limit.max is None or value <= limit.max)
-                and value == value
-            )
-            bounds = limit.min, limit.max
-            verdicts.append(Verdict(run, path, value, *bounds, passed, limit.surface))
+        wanted = str(limit.metric or limit.signal)
+        label, _, rest = wanted.partition(".")
+        chosen = {label: rest} if label in runs else dict.fromkeys(runs, wanted)
+        for run, name in chosen.items():
+            if limit.signal is None:
+                verdict = _of_figure(limit, run, name, runs[run])
+            else:
+                verdict = _of_signal(limit, run, name, (records or {})[run])
+            verdicts.append(verdict)
     return verdicts
+
+
+def _of_figure(limit: Bounds, run: str, path: str, figures: Mapping[str, Any]) -> Verdict:
+    value = figure(figures, path)
+    return Verdict(
+        run, path, value, limit.min, limit.max, _within(limit, value), limit.surface
+    )  # fmt: skip
+
+
+def _of_signal(limit: Bounds, run: str, name: str, record: Recorder) -> Verdict:
+    """Return the verdict on what a limit makes of a signal; none of its window is a failure."""
+    rows = window(record.time, limit.from_s, limit.to_s)
+    value, at_s, remark = _found(limit, record.columns([name])[rows, 0], record.time[rows])
+    unit = next(signal.unit for signal in record.signals if signal.name == name)
+    return Verdict(
+        run, _described(limit, name), value, limit.min, limit.max, _within(limit, value),
+        limit.surface, unit, at_s, remark,
+    )  # fmt: skip
+
+
+def _found(limit: Bounds, values: Array, time: Array) -> tuple[float | None, float | None, str]:
+    """Return what is bounded of samples (n,), its time if it has one, and why there is none."""
+    if not len(values):
+        return None, None, "no sample in this window"
+    missing = np.isnan(values)
+    if missing.any():
+        return None, None, f"not a number at {time[np.argmax(missing)]:g} s"
+    if limit.statistic == "each":
+        at: int | None = worst(values, limit.min, limit.max)
+        value = float(values[at])
+    else:
+        value, at = statistic(limit.statistic, values)
+    return value, None if at is None else float(time[at]), ""
+
+
+def _within(limit: Bounds, value: float | None) -> bool:
+    """Whether a value is there and within the bounds; one that is not a number is not."""
+    return value is not None and (
+        (limit.min is None or value >= limit.min)
+        and (limit.max is None or value <= limit.max)
+        and value == value
+    )
+
+
+def _described(limit: Bounds, name: str) -> str:
+    what = name if limit.statistic == "each" else f"{limit.statistic} of {name}"
+    begin = f" from {limit.from_s:g} s" if limit.from_s is not None else ""
+    return what + begin + (f" to {limit.to_s:g} s" if limit.to_s is not None else "")
+
+
+def window(time: Array, from_s: float | None, to_s: float | None) -> slice:
+    """Return the rows at times (n,) [s], ends included."""
+    slack = 1e-9  # a time is k h, and may lie a rounding error beside what was written
+    first = 0 if from_s is None else int(np.searchsorted(time, from_s - slack))
+    last = len(time) if to_s is None else int(np.searchsorted(time, to_s + slack))
+    return slice(first, last)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from cosim.black_box import map_rows, read_rows
 from cosim.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class Recorder:
             raise ValueError(f"signals recorded twice: {', '.join(sorted(doubled))}")
         self.step_s = step_s
         self._rows = 0
+        self._filled = np.zeros(1, np.uint64)  # the same for whoever else maps the rows
         self._data = np.full((rows, len(names)), np.nan)
         self._slices: dict[str, slice] = {}
         start = 1
@@ -91,7 +93,32 @@ class Recorder:
         row[0] = k * self.step_s
         for columns, part in zip(self._columns, parts):  # noqa: B905 - checked above
             row[columns] = part
-        self._rows = k + 1
+        self._rows = self._filled[0] = k + 1
+
+    def keep_in(self, path: Path) -> None:
+        """Keep the rows in a file from now on, so that they outlive this process; before the first.
+
+        Raises `InputError` where the file cannot be written.
+        """
+        if self._rows:
+            raise ValueError("rows are kept in a file from the first one on, or not at all")
+        groups = [
+            (name, [(s.name, s.unit, s.description) for s in self.signals_of(name)])
+            for name in self.groups
+        ]
+        description = {"step_s": self.step_s, "groups": groups}
+        self._data, self._filled = map_rows(path, description, self._data.shape)
+
+    @classmethod
+    def recovered(cls, path: Path) -> Recorder:
+        """Return what a recorder has kept in a file, to be read; raises `InputError` where the file
+        is no record.
+        """
+        description, rows = read_rows(path)
+        groups = [(name, [Signal(*s) for s in signals]) for name, signals in description["groups"]]
+        recorder = cls(groups, 0, description["step_s"])
+        recorder._data, recorder._rows = rows, len(rows)
+        return recorder
 
     def group(self, name: str) -> Array:
         """Return the filled rows of a group, a view (rows, signals of the group)."""

@@ -6,35 +6,26 @@ report.html. Whatever was recorded before a failure is written before the failur
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from cosim.errors import InputError, NetworkError
-from cosim.limits import Verdict, counted, evaluate
-from cosim.recorder import Recorder, require_parquet
+from cosim.errors import NetworkError
+from cosim.limits import counted, evaluate, run_of
+from cosim.recorder import Recorder
+from cosim.results import finite, folder_of, prepare, write_json
 from cosim.scenario.controllers import Controller
 from cosim.scenario.paper_row import row_of
 from cosim.scenario.schema import Scenario
+from cosim.verdict import Verdict
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
 Progress = Callable[[str, int, int], None]
-
-RESULT_FILES: Final = (
-    "signals.csv",
-    "signals.parquet",
-    "metrics.json",
-    "scenario.resolved.yaml",
-    "versions.json",
-    "report.html",
-)
 
 
 class RunResult(Protocol):
@@ -107,6 +98,10 @@ class Assembly(Protocol):
 Assemble = Callable[[Scenario, Controller], Assembly]
 
 
+# Further verdicts on a scenario's records, by the names of the runs.
+Judge = Callable[[Scenario, Mapping[str, Recorder]], Sequence[Verdict]]
+
+
 @dataclass(frozen=True)
 class RunOutcome:
     """One run: the name of its controller, the record and the figures of metrics.json."""
@@ -153,27 +148,24 @@ def execute(
     """
     from cosim.provenance import add_files, provenance
 
-    if scenario.output.format == "parquet":
-        require_parquet()
     assemble = assemble or _assemble()
-    _prepare(output_dir, scenario)
+    prepare(output_dir, scenario)
     runs: list[RunOutcome] = []
     versions: dict[str, Any] = {}
     for controller in scenario.controllers:
-        with _network_errors():
+        with network_errors():
             assembly = assemble(scenario, controller)
         if not versions:
             versions = provenance({"scenario": scenario.file}, command)
         add_files(versions, assembly.files, controller.label)
-        _write_json(output_dir / "versions.json", versions)
-        folder = output_dir if len(scenario.controllers) == 1 else output_dir / controller.label
-        runs.append(_run(scenario, controller, assembly, folder, progress))
-    outcome = _judge(scenario, output_dir, tuple(runs))
-    return _report(outcome, versions)
+        write_json(output_dir / "versions.json", versions)
+        folder = folder_of(scenario, output_dir, controller.label)
+        runs.append(drive(scenario, controller, assembly, folder, progress))
+    return conclude(scenario, output_dir, runs, versions)
 
 
 @contextmanager
-def _network_errors() -> Iterator[None]:
+def network_errors() -> Iterator[None]:
     """Turn the sensor's own exception into one of this package's."""
     from sensor import SensorError
 
@@ -189,30 +181,16 @@ def _assemble() -> Assemble:
     return assemble
 
 
-def _prepare(output_dir: Path, scenario: Scenario) -> None:
-    """Make the folder, and take away what an earlier run left there."""
-    try:
-        output_dir.mkdir(parents=True, exist_ok=True)
-        for folder in (output_dir, *(path for path in output_dir.iterdir() if path.is_dir())):
-            left = [folder / name for name in RESULT_FILES if (folder / name).is_file()]
-            for path in left:
-                path.unlink()
-            if left and folder != output_dir and not any(folder.iterdir()):
-                folder.rmdir()
-        (output_dir / "scenario.resolved.yaml").write_text(
-            resolved_yaml(scenario), encoding="utf-8"
-        )
-    except OSError as error:
-        raise InputError(f"cannot write to '{output_dir}': {error.strerror or error}") from None
-
-
-def _run(
+def drive(
     scenario: Scenario,
     controller: Controller,
     assembly: Assembly,
     folder: Path,
-    progress: Progress | None,
+    progress: Progress | None = None,
 ) -> RunOutcome:
+    """Run one controller's assembly to its end, write its signals to `folder` and return its
+    figures; after an error the rows before it are written.
+    """
     from cosim.compare import compare
     from cosim.control.damper_map import damper_map
     from cosim.control.figures import control_figures
@@ -225,7 +203,7 @@ def _run(
             progress(label, done, total)
 
     try:
-        with _network_errors():
+        with network_errors():
             result = assembly.run(tell)
     finally:
         # Also after an error: the rows before it are what shows its cause.
@@ -252,15 +230,32 @@ def _run(
     return RunOutcome(label, assembly.recorder, figures)
 
 
-def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -> Outcome:
+def conclude(
+    scenario: Scenario,
+    output_dir: Path,
+    runs: Sequence[RunOutcome],
+    versions: Mapping[str, Any],
+    judge: Judge | None = None,
+) -> Outcome:
+    """Judge the runs that have ended, all or some of a scenario's, by its limits and by `judge`,
+    and write metrics.json and the report.
+    """
     from cosim.compare import paper_figures
     from cosim.control.against_truth import against_truth
 
     figures = {run.label: run.figures for run in runs}
-    for label, found in against_truth(scenario.controllers, figures).items():
+    ended = [controller for controller in scenario.controllers if controller.label in figures]
+    for label, found in against_truth(ended, figures).items():
         figures[label]["against_truth"] = found
+    records = {run.label: run.recorder for run in runs}
     limits, notes = counted(scenario.limits, scenario.road.surface_name, scenario.real_time)
-    verdicts = (*evaluate(limits, figures), *_unfinished(scenario, figures))
+    missing = {controller.label for controller in scenario.controllers} - set(figures)
+    limits = [limit for limit in limits if run_of(limit) not in missing]
+    verdicts = (
+        *evaluate(limits, figures, records),
+        *_unfinished(scenario, figures),
+        *(judge(scenario, records) if judge is not None else ()),
+    )
     metrics = finite(
         {
             "scenario": scenario.name,
@@ -270,8 +265,10 @@ def _judge(scenario: Scenario, output_dir: Path, runs: tuple[RunOutcome, ...]) -
             "paper": paper_figures(row_of(scenario)),
         }
     )
-    _write_json(output_dir / "metrics.json", metrics)
-    return Outcome(scenario, output_dir, runs, verdicts, metrics, (*notes, *_idle(scenario, runs)))
+    write_json(output_dir / "metrics.json", metrics)
+    notes = (*notes, *_idle(scenario, runs))
+    outcome = Outcome(scenario, output_dir, tuple(runs), verdicts, metrics, notes)
+    return _report(outcome, versions)
 
 
 def _idle(scenario: Scenario, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
@@ -307,53 +304,3 @@ def _report(outcome: Outcome, versions: Mapping[str, Any]) -> Outcome:
     except ReportError as missing:
         return replace(outcome, notes=(*outcome.notes, str(missing)))
     return outcome
-
-
-def finite(value: Any) -> Any:
-    """Return `value` with every number that JSON cannot carry (NaN, infinities) as None."""
-    if isinstance(value, Mapping):
-        return {str(key): finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
-
-
-def resolved_yaml(scenario: Scenario) -> str:
-    """Return the scenario with every default and override filled in, variants as parameters and
-    absolute paths, as YAML.
-    """
-    import io
-
-    from ruamel.yaml import YAML
-
-    data = scenario.model_dump(mode="json", by_alias=True, exclude_none=True)
-    if scenario.road.file is not None:
-        data["road"]["file"] = str(scenario.resolve(scenario.road.file).resolve())
-        del data["road"]["surface"], data["road"]["obstacles"]
-    data["vehicle"]["parameters"] = scenario.parameters
-    del data["vehicle"]["variants"]
-    if scenario.vehicle.fmu != "builtin":
-        data["vehicle"]["fmu"] = str(scenario.resolve(scenario.vehicle.fmu).resolve())
-        del data["vehicle"]["fmi_version"]
-    for part in (data["sensor"], *data["controllers"]):
-        for kind in {"network", "fmu"} & part.keys():
-            part[kind] = str(scenario.resolve(part[kind]).resolve())
-    for own, controller in zip(data["controllers"], scenario.controllers, strict=True):
-        if getattr(controller, "fallback", None) is not None:
-            del own["initial_command"]
-    for fault in data["faults"]:
-        if "file" in fault:
-            fault["file"] = str(scenario.resolve(fault["file"]).resolve())
-    yaml = YAML()
-    yaml.width = 100
-    stream = io.StringIO()
-    yaml.dump(data, stream)
-    return stream.getvalue()
-
-
-def _write_json(path: Path, value: Any) -> None:
-    path.write_text(
-        json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n", "utf-8"
-    )

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from cosim.limits import Verdict
 from cosim.metrics import (
     ESTIMATORS,
     PARTS,
@@ -15,6 +14,7 @@ from cosim.metrics import (
     unit_of,
     with_unit,
 )
+from cosim.verdict import Verdict
 from sensor.metrics import LEAST_TRUTH_RMS
 
 NAMES: Final = {

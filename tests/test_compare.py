@@ -17,7 +17,7 @@ from cosim.metrics import (
     unit_of,
 )
 from cosim.recorder import Recorder
-from cosim.run import finite
+from cosim.results import finite
 from cosim.scenario.limit import Limit
 from cosim.tables import (
     MANOEUVRE_NAMES,

@@ -18,7 +18,8 @@ from loop_rig import write_scenario
 
 from cosim.errors import InputError
 from cosim.faults.assemble import fault_block
-from cosim.run import execute, resolved_yaml
+from cosim.results import resolved_yaml
+from cosim.run import execute
 from cosim.scenario.load import load
 from sensor.channels import CHANNEL_NAMES
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from cosim.errors import InputError
-from cosim.run import resolved_yaml
+from cosim.results import resolved_yaml
 from cosim.scenario.load import load
 from cosim.scenario.overrides import split_key
 from cosim.scenario.paper_row import row_of

@@ -15,7 +15,8 @@ from loop_rig import Guess, write_scenario
 from cosim.assembly import assemble
 from cosim.cli import main
 from cosim.errors import InputError
-from cosim.run import execute, resolved_yaml
+from cosim.results import resolved_yaml
+from cosim.run import execute
 from cosim.scenario.load import load
 from cosim.scenario.schema import json_schema
 from sensor.channels import CHANNEL_NAMES

@@ -9,7 +9,7 @@ from pathlib import Path
 from cosim.inspect.facts import Facts
 from cosim.inspect.kind import recognise
 from cosim.inspect.show import show
-from cosim.run import finite
+from cosim.results import finite
 
 ROWS = 20  # of a list of variables, unless all are asked for
 

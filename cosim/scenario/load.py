@@ -17,6 +17,7 @@ from cosim.scenario.messages import problems_of
 from cosim.scenario.osp_scenario import acting
 from cosim.scenario.overrides import Override, apply_override, parse_override
 from cosim.scenario.schema import Scenario, json_schema
+from cosim.scenario.signals import raw_signal_problems, signal_problems
 from cosim.scenario.source import Key, Source, read
 from cosim.scenario.variants import combine
 from sensor.paper import paper_rows
@@ -74,6 +75,7 @@ def load_with(
         problems += found
         problems += combination_problems(scenario)
         problems += acting(scenario.faults, source)[1]
+        problems += () if problems else signal_problems(scenario)
     if problems:
         raise InputError(sorted(problems, key=_order))
     return scenario
@@ -126,7 +128,7 @@ def _file_problems(data: dict[str, Any], source: Source) -> list[Problem]:
 
 
 def _name_problems(data: dict[str, Any], source: Source) -> list[Problem]:
-    """Check the names that are known before the run: metrics and the paper's rows."""
+    """Check the names that are known before the run: metrics, signals and the paper's rows."""
     problems = []
     limits, labels, kind = data.get("limits"), _labels(data), _value(data, ("manoeuvre", "kind"))
     faults = _fault_labels(data)
@@ -135,6 +137,7 @@ def _name_problems(data: dict[str, Any], source: Source) -> list[Problem]:
         message = check_metric(metric, labels, kind, faults) if isinstance(metric, str) else None
         if message:
             problems.append(Problem(message, source.locate(("limits", index, "metric"))))
+    problems += raw_signal_problems(data, labels, source)
     row, rows = data.get("paper_row"), [printed.scenario for printed in paper_rows()]
     if isinstance(row, str) and row not in rows:
         message = f"'{row}' is not a row of the paper's Table 4{did_you_mean(row, rows)}"

@@ -23,6 +23,7 @@ from cosim.errors import Place, Problem, did_you_mean
 from cosim.scenario.controllers import Controller, Passive
 from cosim.scenario.driver import Driver
 from cosim.scenario.faults import Fault, OspScenario, labels
+from cosim.scenario.golden import Golden
 from cosim.scenario.latency import Latency
 from cosim.scenario.limit import Limit
 from cosim.scenario.manoeuvre import Manoeuvre
@@ -84,6 +85,9 @@ class Scenario(Model):
         default=None, description="go by the clock; as fast as possible if not given"
     )
     limits: tuple[Limit, ...] = Field(default=(), strict=False, description="what must hold")
+    goldens: tuple[Golden, ...] = Field(
+        default=(), strict=False, description="what must stay as it was, for `cosim test`"
+    )
     paper_row: str | None = Field(
         default=None, description="row of the paper's Table 4 that the result is shown beside"
     )
