@@ -7,13 +7,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim import loop
-from cosim.bus.assemble import bus_problems, bus_sensor
 from cosim.control.choice import controller_of
 from cosim.control.damper_map import damper_map
 from cosim.course import Course, course_of
@@ -50,9 +49,6 @@ from cosim.wiring import Wiring, mapped_wiring, own_wiring
 from sensor import SAMPLE_RATE_HZ
 from sensor.conditions import PRODUCTION_PARAMETERS
 
-if TYPE_CHECKING:
-    from cosim.bus.sensor import BusSensor
-
 Array = npt.NDArray[np.float64]
 
 STEP_S: Final = 1 / SAMPLE_RATE_HZ
@@ -63,8 +59,7 @@ LATE: Final = 1.3  # a driver this much slower than his profile has come to grie
 @dataclass(frozen=True)
 class RunResult:
     """How a run ended. `comfort` and `grip` are empty where the vehicle lacks the signals,
-    `manoeuvre` where the road was followed or the manoeuvre cut short, `bus` where the sensor is on
-    none; times in s, deviation in m.
+    `manoeuvre` where the road was followed or the manoeuvre cut short; times in s, deviation in m.
     """
 
     steps_done: int
@@ -77,7 +72,6 @@ class RunResult:
     manoeuvre: Mapping[str, float]
     grip: Mapping[str, Mapping[str, float]]
     timing: Mapping[str, Any]
-    bus: Mapping[str, float]
 
 
 @dataclass
@@ -96,13 +90,10 @@ class Assembly:
     steps: int
     if_late: str  # why the run ends where the driver has not come to the end
     sensor_fmu: FmuSensor | None = None  # the estimator behind the sensor, if it is an FMU
-    bus: BusSensor | None = None
 
     def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
         """Run to the end of the lap or the last step, and let go of the bench whatever happens."""
         try:
-            if self.bus is not None:
-                self.bus.open()
             self.blocks.vehicle.connect()
             begin = time.perf_counter()
             with self.clock:
@@ -112,8 +103,6 @@ class Assembly:
             self.blocks.vehicle.stop()
             if self.sensor_fmu is not None:
                 self.sensor_fmu.close()
-            if self.bus is not None:
-                self.bus.close()
         done = self.driver.completed
         return RunResult(
             steps_done=last,
@@ -126,7 +115,6 @@ class Assembly:
             manoeuvre=self.plan.figures(motion_of(self.recorder)),
             grip=grip_figures(_recorded(self.recorder, GRIP_SHARE)),
             timing=self.clock.figures(),
-            bus={} if self.bus is None else self.bus.figures(),
         )
 
     def _unfinished(self) -> str:
@@ -161,19 +149,16 @@ def assemble(
     does not load.
     """
     wiring, description, course, plan = checked_parts(scenario, roads)
-    file, own, bus, acting = None, None, None, scenario.acting_faults
+    file, own, acting = None, None, scenario.acting_faults
     if sensor is None:
         settings = controller.sensor_of_run(scenario.sensor)
         file = estimator_file(scenario, settings)
-        if settings.bus is not None:
-            sensor = bus = bus_sensor(settings, file)
-        else:
-            own = estimator_of(scenario, settings)
-            sensor = over_gaps(own, acting)
+        own = estimator_of(scenario, settings)
+        sensor = over_gaps(own, acting)
     latency = controller.latency_of_run(scenario.latency)
     sensor = late_sensor(sensor, latency)
     passive = isinstance(controller, Passive) and dampers is None
-    start = _start_values(scenario, description, course, plan, passive)
+    start = start_values(scenario, description, course, plan, passive)
     block = dampers or controller_of(controller, damper_map(scenario.parameters))
     steps, if_late = _steps(scenario, plan)
     driver = plan.driver(STEP_S, friction_of(scenario))
@@ -201,7 +186,6 @@ def assemble(
         steps=steps,
         if_late=if_late,
         sensor_fmu=own if isinstance(own, FmuSensor) else None,
-        bus=bus,
     )
 
 
@@ -222,7 +206,7 @@ def checked_parts(
         else mapped_wiring(description, settings.variables, scenario.problem)
     )
     problems += checked_parameters(scenario, description)
-    problems += stage_problems(scenario, wiring, description.path.name) + bus_problems(scenario)
+    problems += stage_problems(scenario, wiring, description.path.name)
     found = None
     try:
         found = _planned(scenario, roads)
@@ -257,10 +241,12 @@ def _line(problem: Problem) -> int:
     return problem.place.line if problem.place is not None else 0
 
 
-def _start_values(
+def start_values(
     scenario: Scenario, description: Description, course: Course, plan: Plan, passive: bool
 ) -> dict[str, Value]:
-    """Return the start values; of ours, another FMU gets those that it has by the same names."""
+    """Return the vehicle's start values; of ours, another FMU gets those that it has by the same
+    names.
+    """
     speed = float(plan.speed[int(np.searchsorted(plan.line.s, 0.0))])
     own = builtin_start(course, plan.line, speed, passive, scenario.road.friction)
     own = {**PRODUCTION_PARAMETERS, **own}
@@ -299,4 +285,4 @@ def _recorded(recorder: Recorder, quantities: Sequence[Quantity]) -> Array:
     return recorder.columns([quantity.name for quantity in quantities])
 
 
-__all__ = ["Assembly", "RunResult", "assemble", "checked_parts"]
+__all__ = ["Assembly", "RunResult", "assemble", "checked_parts", "start_values"]

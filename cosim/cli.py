@@ -17,7 +17,6 @@ import click
 
 from cosim.exit_codes import cores, failures_as_exit_codes, one_thread
 from cosim.sensor_cli import sensor
-from cosim.sensor_node_cli import sensor_node
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -174,6 +173,44 @@ def inspect(path: Path, as_json: bool, every: bool) -> None:
         run_inspection(path, as_json, every)
 
 
+@main.command("export-ssp")
+@click.argument("scenario")
+@click.option(
+    "-o",
+    "--out",
+    metavar="FILE.ssp",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Where the package goes.",
+)
+@click.option(
+    "--controller",
+    metavar="NAME",
+    help="Whose damper commands are recorded; the scenario's first by default.",
+)
+@click.option(
+    "--set",
+    "overrides",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Override a field of the scenario; may be repeated.",
+)
+def export_ssp(
+    scenario: str, out: Path, controller: str | None, overrides: tuple[str, ...]
+) -> None:
+    """Write the wiring of SCENARIO as an SSP 1.0 package: vehicle and sensor FMU, their start
+    values and connections.
+
+    Driver and controller are no FMUs: the package's inputs are what they command, recorded in a run
+    of the scenario.
+    """
+    one_thread()
+    with failures_as_exit_codes():
+        from cosim.ssp.command import run as run_export
+
+        run_export(scenario, out, controller, [(text, f"--set {text}") for text in overrides])
+
+
 def _run_one(
     scenario: str, overrides: Sequence[tuple[str, str]], output_dir: Path | None, as_json: bool
 ) -> int:
@@ -223,4 +260,3 @@ def _print_json(value: object) -> None:
 
 
 main.add_command(sensor)
-main.add_command(sensor_node)

@@ -25,8 +25,6 @@ PACKAGES: Final = (
     "ruamel.yaml",
     "pyarrow",
     "uplot-python",
-    "python-can",
-    "cantools",
 )
 
 

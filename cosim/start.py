@@ -11,11 +11,13 @@ from cosim.quantities import INPUT_QUANTITIES
 from cosim.road import Track
 from cosim.scenario.schema import Scenario
 
+ROAD_FILE: Final = "Road.File"
+OWN_ROAD: Final = "road.crg"  # in its resources: the built-in FMU's road where none is named
 FRICTION: Final = "Road.Friction"  # an input of the built-in FMU: set once, it is held
 
 # Set from the scenario's other fields; a second setting under parameters would contradict them.
 _TAKEN: Final = {
-    "Road.File": "road", "Init.x": "road", "Init.y": "road", "Init.Yaw": "road",
+    ROAD_FILE: "road", "Init.x": "road", "Init.y": "road", "Init.Yaw": "road",
     "Init.Velocity": "driver.speed_kmh", "Damp.Passive": "controllers",
     FRICTION: "road.friction",
 }  # fmt: skip
@@ -34,7 +36,7 @@ def builtin_start(
         "Init.Yaw": pose.heading,
         "Init.Velocity": speed,
         "Damp.Passive": passive,
-        "Road.File": str(course.file),
+        ROAD_FILE: str(course.file),
     }
     return start if friction is None else start | {FRICTION: friction}
 

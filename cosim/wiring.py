@@ -187,7 +187,7 @@ def _converted(
     return Wire(quantity, name, scale * base.factor, scale * base.offset)
 
 
-_DIMENSIONS: Final[dict[str, dict[str, int]]] = {
+DIMENSIONS: Final[dict[str, dict[str, int]]] = {
     "1": {}, "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "m/s2": {"m": 1, "s": -2}, "rad": {"rad": 1},
     "rad/s": {"rad": 1, "s": -1}, "N": {"kg": 1, "m": 1, "s": -2},
 }  # fmt: skip
@@ -197,7 +197,7 @@ def _same_dimension(base: Any, unit: str, wanted: str) -> bool:
     """Compare SI exponents. Many tools leave the radian's out, so an angle's unit may tell by its
     name.
     """
-    expected = _DIMENSIONS[wanted]
+    expected = DIMENSIONS[wanted]
     found = {name: getattr(base, name, 0) or 0 for name in _EXPONENTS}
     if expected.get("rad") and not found["rad"] and re.search(r"rad|deg|grad|°|rpm", unit):
         found["rad"] = expected["rad"]

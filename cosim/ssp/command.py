@@ -1,0 +1,56 @@
+"""The body of `cosim export-ssp`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from cosim import show
+from cosim.errors import InputError, did_you_mean
+from cosim.inspect.facts import size_of
+from cosim.scenario.controllers import Controller
+from cosim.scenario.load import load_labelled
+from cosim.scenario.schema import Scenario
+from cosim.ssp.export import export
+
+
+def run(
+    scenario: str, out: Path, controller: str | None, overrides: Sequence[tuple[str, str]]
+) -> None:
+    """Write the package and say what is in it. Raises what `export` raises."""
+    settings = load_labelled(scenario, overrides)
+    chosen = _controller(settings, controller)
+    if not out.parent.is_dir():
+        raise InputError(f"'{out}': there is no folder '{out.parent}'")
+    with show.progress() as progress:
+
+        def tell(done: int, total: int) -> None:
+            if progress is not None:
+                progress(chosen.label, done, total)
+
+        package = export(settings, chosen, tell)
+    part = out.with_name(f".{out.name}.part")
+    part.write_bytes(package.content)
+    part.replace(out)
+    parts, wires = package.structure.components, package.structure.connections
+    print(
+        f"{out}: {' and '.join(part.name for part in parts)}, {len(wires)} connections, "
+        f"{size_of(len(package.content))}\n"
+        f"The commands of {package.run.stop_s:g} s with controller {chosen.label} and the sensor's "
+        f"estimates are in it too.",
+        file=sys.stderr,
+    )
+
+
+def _controller(scenario: Scenario, label: str | None) -> Controller:
+    """Return the controller whose commands are recorded, the first if none is named."""
+    by_label = {controller.label: controller for controller in scenario.controllers}
+    if label is None:
+        return scenario.controllers[0]
+    if label not in by_label:
+        known = ", ".join(by_label)
+        raise InputError(
+            f"--controller {label}: the scenario has {known}{did_you_mean(label, by_label)}"
+        )
+    return by_label[label]
