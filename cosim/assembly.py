@@ -7,12 +7,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim import loop
+from cosim.bus.assemble import bus_problems, bus_sensor
 from cosim.control.choice import controller_of
 from cosim.control.damper_map import damper_map
 from cosim.course import Course, course_of
@@ -49,6 +50,9 @@ from cosim.wiring import Wiring, mapped_wiring, own_wiring
 from sensor import SAMPLE_RATE_HZ
 from sensor.conditions import PRODUCTION_PARAMETERS
 
+if TYPE_CHECKING:
+    from cosim.bus.sensor import BusSensor
+
 Array = npt.NDArray[np.float64]
 
 STEP_S: Final = 1 / SAMPLE_RATE_HZ
@@ -59,7 +63,8 @@ LATE: Final = 1.3  # a driver this much slower than his profile has come to grie
 @dataclass(frozen=True)
 class RunResult:
     """How a run ended. `comfort` and `grip` are empty where the vehicle lacks the signals,
-    `manoeuvre` where the road was followed or the manoeuvre cut short; times in s, deviation in m.
+    `manoeuvre` where the road was followed or the manoeuvre cut short, `bus` where the sensor is on
+    none; times in s, deviation in m.
     """
 
     steps_done: int
@@ -72,6 +77,7 @@ class RunResult:
     manoeuvre: Mapping[str, float]
     grip: Mapping[str, Mapping[str, float]]
     timing: Mapping[str, Any]
+    bus: Mapping[str, float]
 
 
 @dataclass
@@ -90,10 +96,13 @@ class Assembly:
     steps: int
     if_late: str  # why the run ends where the driver has not come to the end
     sensor_fmu: FmuSensor | None = None  # the estimator behind the sensor, if it is an FMU
+    bus: BusSensor | None = None
 
     def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
         """Run to the end of the lap or the last step, and let go of the bench whatever happens."""
         try:
+            if self.bus is not None:
+                self.bus.open()
             self.blocks.vehicle.connect()
             begin = time.perf_counter()
             with self.clock:
@@ -103,6 +112,8 @@ class Assembly:
             self.blocks.vehicle.stop()
             if self.sensor_fmu is not None:
                 self.sensor_fmu.close()
+            if self.bus is not None:
+                self.bus.close()
         done = self.driver.completed
         return RunResult(
             steps_done=last,
@@ -115,6 +126,7 @@ class Assembly:
             manoeuvre=self.plan.figures(motion_of(self.recorder)),
             grip=grip_figures(_recorded(self.recorder, GRIP_SHARE)),
             timing=self.clock.figures(),
+            bus={} if self.bus is None else self.bus.figures(),
         )
 
     def _unfinished(self) -> str:
@@ -149,12 +161,15 @@ def assemble(
     does not load.
     """
     wiring, description, course, plan = checked_parts(scenario, roads)
-    file, own, acting = None, None, scenario.acting_faults
+    file, own, bus, acting = None, None, None, scenario.acting_faults
     if sensor is None:
         settings = controller.sensor_of_run(scenario.sensor)
         file = estimator_file(scenario, settings)
-        own = estimator_of(scenario, settings)
-        sensor = over_gaps(own, acting)
+        if settings.bus is not None:
+            sensor = bus = bus_sensor(settings, file)
+        else:
+            own = estimator_of(scenario, settings)
+            sensor = over_gaps(own, acting)
     latency = controller.latency_of_run(scenario.latency)
     sensor = late_sensor(sensor, latency)
     passive = isinstance(controller, Passive) and dampers is None
@@ -186,6 +201,7 @@ def assemble(
         steps=steps,
         if_late=if_late,
         sensor_fmu=own if isinstance(own, FmuSensor) else None,
+        bus=bus,
     )
 
 
@@ -206,7 +222,7 @@ def checked_parts(
         else mapped_wiring(description, settings.variables, scenario.problem)
     )
     problems += checked_parameters(scenario, description)
-    problems += stage_problems(scenario, wiring, description.path.name)
+    problems += stage_problems(scenario, wiring, description.path.name) + bus_problems(scenario)
     found = None
     try:
         found = _planned(scenario, roads)

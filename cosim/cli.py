@@ -17,6 +17,7 @@ import click
 
 from cosim.exit_codes import cores, failures_as_exit_codes, one_thread
 from cosim.sensor_cli import sensor
+from cosim.sensor_node_cli import sensor_node
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -260,3 +261,4 @@ def _print_json(value: object) -> None:
 
 
 main.add_command(sensor)
+main.add_command(sensor_node)

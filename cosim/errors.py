@@ -106,6 +106,12 @@ class NetworkError(CosimError):
     exit_code: ClassVar[int] = 3
 
 
+class BusError(CosimError):
+    """A bus could not be opened or failed, or no sensor answers on it."""
+
+    exit_code: ClassVar[int] = 3
+
+
 def explained(error: CosimError | OSError) -> tuple[int, tuple[str, ...]]:
     """Return the exit code of a failure and a sentence for each of its problems."""
     if isinstance(error, CosimError):

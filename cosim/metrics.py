@@ -49,6 +49,17 @@ CONTROL_FIGURES: Final = (
     "against_truth.deflection_percent",
 )
 GRIP_FIGURES: Final = ("peak_percent", "mean_percent")
+BUS_FIGURES: Final = (
+    "samples",
+    "answers_in_time",
+    "late_answers",
+    "unanswered_samples",
+    "values_out_of_range",
+    "frames_lost",
+    "frames_lost_to_sensor",
+    "frames_lost_from_sensor",
+    *(f"{what}_{part}_ms" for what in ("latency", "age") for part in ("p50", "p99", "max")),
+)
 RUN_FIGURES: Final = (
     "lap_time_s",
     "largest_deviation_m",
@@ -148,6 +159,7 @@ def metric_names(
     names += CONTROL_FIGURES
     names += [f"grip.{wheel}.{figure}" for wheel in WHEELS for figure in GRIP_FIGURES]
     names += [f"timing.{figure}" for figure in (*STEP_TIMES, *LATENESS)]
+    names += [f"bus.{figure}" for figure in BUS_FIGURES]
     names += [f"manoeuvre.{figure}" for figure in MANOEUVRE_FIGURES.get(manoeuvre or "", ())]
     names += [
         f"faults.{f}.{part}.{n}" for f in faults for part in FAULT_PARTS for n in FAULT_FIGURES

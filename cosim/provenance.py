@@ -25,6 +25,8 @@ PACKAGES: Final = (
     "ruamel.yaml",
     "pyarrow",
     "uplot-python",
+    "python-can",
+    "cantools",
 )
 
 

@@ -71,6 +71,10 @@ class RunResult(Protocol):
     def timing(self) -> Mapping[str, Any]:
         """What the machine took: `cosim.metrics.STEP_TIMES`, in real time `LATENESS` too."""
 
+    @property
+    def bus(self) -> Mapping[str, Any]:
+        """Figures of `cosim.metrics.BUS_FIGURES` by name; empty without a bus."""
+
 
 class Assembly(Protocol):
     """The blocks of one run, connected and ready."""
@@ -221,6 +225,7 @@ def drive(
         "manoeuvre": dict(result.manoeuvre),
         "grip": dict(result.grip),
         "timing": dict(result.timing),
+        "bus": dict(result.bus),
     }
     return RunOutcome(label, assembly.recorder, figures)
 

@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from cosim.errors import did_you_mean
+from cosim.scenario.bus import Bus
 from cosim.scenario.model import Model
 from sensor.estimators import DEFAULT, names
 
@@ -48,6 +49,10 @@ class Sensor(Model):
     condition: Literal["ideal", "production"] = Field(
         default="ideal",
         description="how the channels are measured: exactly, or by a car's sensors",
+    )
+    bus: Bus | None = Field(
+        default=None,
+        description="where the estimator is not in this process but on a CAN bus (docs/can.md)",
     )
 
     @model_validator(mode="before")
