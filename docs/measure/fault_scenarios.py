@@ -65,7 +65,7 @@ def late_estimates(runs: Mapping[str, Any]) -> str:
 
 def rides(runs: Mapping[str, Any]) -> str:
     """Return the table of a closed loop, against its first run."""
-    header = ["run", "a_w, m/s²", "deflection, mm", "tyre load, N", "RMSE, mm/s"]
+    header = ["run", "a_w, m/s²", "deflection, mm", "tyre load, N", "gain kept, %", "wrong, %"]
     return table(header, (list(_ride(label, run)) for label, run in runs.items()))
 
 
@@ -74,12 +74,12 @@ def _ride(label: str, run: Mapping[str, Any]) -> Iterator[str]:
     yield f"{run['comfort']['weighted_acceleration_m_s2']:.3f}"
     yield f"{1e3 * run['comfort']['deflection_rms_m']:.2f}"
     yield f"{run['comfort']['tyre_load_rms_n']:.0f}"
-    yield millimetres(figure(run, "sensor.overall.rmse_m_s"))
+    yield percent(figure(run, "against_truth.gain_kept_percent"))
+    yield percent(figure(run, "decisions.wrong_percent"))
 
 
-def main() -> None:
-    """Write the page."""
-    found = results()
+def write(found: Mapping[str, Mapping[str, Any]]) -> None:
+    """Write the page from the figures of the runs, by scenario."""
     values = {"statistics": table(["fault", "figure", "theory", "measured"], rows())}
     for name, runs in found.items():
         if name.startswith("latency_class_b"):
@@ -92,4 +92,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    write(results())
