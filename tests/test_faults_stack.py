@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tracemalloc
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from fault_rig import block, through, varied
 from hypothesis import given
 from hypothesis import settings as how
 from hypothesis import strategies as st
+from loop_rig import Guess
 
+from cosim.faults.latency import LateDampers, LateSensor
 from cosim.faults.stack import FaultStack, NoFaults
 from cosim.scenario.fault_channels import GROUPS, indices
 from sensor.channels import CHANNEL_NAMES, CHANNEL_UNITS
@@ -162,6 +165,28 @@ def test_without_faults_the_channels_are_passed_on_as_they_are() -> None:
     assert none.bridged is channels
 
 
+def grown(step: Callable[[int], object]) -> tuple[int, int]:
+    """Return by how many bytes 300 steps let the memory grow, at their end and at most."""
+    for k in range(300):
+        step(k)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    for k in range(300, 600):
+        step(k)
+    now, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return now - before, peak - before
+
+
+def test_latencies_allocate_nothing() -> None:
+    command, sample = np.zeros(4), np.zeros(14)
+    dampers, sensor = LateDampers(3, command), LateSensor(Guess(), 3)
+    for step in (lambda _: dampers.step(command), lambda _: sensor.step(sample, command)):
+        end, most = grown(step)
+        assert end < 512
+        assert most < 2048
+
+
 def test_a_step_allocates_nothing() -> None:
     stack = block(
         {"kind": "noise", "channels": "imu", "rms": 0.1} | {"channels": "accelerations"},
@@ -179,13 +204,6 @@ def test_a_step_allocates_nothing() -> None:
     )
     assert isinstance(stack, FaultStack)
     channels = varied(600)
-    for k in range(300):
-        stack.step(k, channels[k])
-    tracemalloc.start()
-    before = tracemalloc.get_traced_memory()[0]
-    for k in range(300, 600):
-        stack.step(k, channels[k])
-    now, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert now - before < 512
-    assert peak - before < 2048
+    end, most = grown(lambda k: stack.step(k, channels[k]))
+    assert end < 512
+    assert most < 2048

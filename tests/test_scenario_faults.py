@@ -14,6 +14,7 @@ from loop_rig import Guess, write_scenario
 
 from cosim.assembly import assemble
 from cosim.cli import main
+from cosim.dataset.drive import run_of
 from cosim.errors import InputError
 from cosim.results import resolved_yaml
 from cosim.run import execute
@@ -274,6 +275,16 @@ def test_speed_and_motion_in_figures_are_the_car_s_not_the_faulty_ones(tmp_path:
         )
         figures.append(outcome.runs[0].figures["manoeuvre"])
     assert figures[0] == figures[1]
+
+
+def test_a_data_set_keeps_the_channels_before_errors_and_faults(tmp_path: Path) -> None:
+    record = run(tmp_path).runs[0].recorder
+    kept = run_of(record, np.zeros(4), "a", {}).channels
+    np.testing.assert_array_equal(kept, record.group("ideal").astype(np.float32))
+    fault = "[{kind: gain, channels: all, factor: 2}]"
+    record = run(tmp_path, faults=fault, sensor="{estimator: zero}").runs[0].recorder
+    kept = run_of(record, np.zeros(4), "a", {}).channels
+    np.testing.assert_array_equal(kept, record.group("measured").astype(np.float32))
 
 
 def test_a_user_sees_faults_in_table_and_report(tmp_path: Path) -> None:

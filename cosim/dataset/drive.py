@@ -15,7 +15,7 @@ import numpy.typing as npt
 from cosim.dataset.plan import COMMAND, PlannedRun
 from cosim.dataset.sensorless import NoSensor
 from cosim.errors import InputError
-from sensor.channels import ROAD, STAGE
+from sensor.channels import CHANNEL_NAMES, ROAD, STAGE
 
 if TYPE_CHECKING:
     from cosim.assembly import Assembly
@@ -110,14 +110,14 @@ def _dampers(planned: PlannedRun) -> ControllerBlock | None:
 
 
 def run_of(recorder: Recorder, initial: Array, name: str, recipe: Mapping[str, Any]) -> Run:
-    """Return what was recorded as a run of a data set; `initial` (4,) is the damper command before
-    the first sample.
+    """Return what was recorded as a run of a data set, its channels before any error and fault;
+    `initial` (4,) is the damper command before the first sample.
     """
     from cosim.recorder import held
     from sensor.dataset import Run
 
     recorded = {
-        "channels": recorder.group("channels"),
+        "channels": recorder.car_channels(CHANNEL_NAMES),
         "stage": recorder.columns([channel.name for channel in STAGE]),
         "commands": held(recorder.group("command"), initial),
         "truth": recorder.group("truth"),
