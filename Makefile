@@ -12,7 +12,7 @@ SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/* fmu/sensor/*)
 
-.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness faults manoeuvres roads benchmarks sanitize clean study retrain-check
+.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness faults manoeuvres roads benchmarks embedded sanitize clean study retrain-check
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -46,6 +46,9 @@ fmu: $(VENV)/demo.stamp ## rebuild the FMUs after a change of the C sources
 cross: $(VENV)/demo.stamp ## vehicle FMUs for Linux, Windows and macOS in dist/, and the binaries of cosim pack --platform (the first time some ten minutes)
 	$(BIN)/python -m pip install --quiet -e '.[cross]'
 	$(BIN)/python fmu/cross.py
+
+embedded: $(VENV)/test.stamp ## the C sensor on an emulated Cortex-M7 (needs gcc-arm-none-eabi, newlib, qemu-system-arm): docs/embedded.md
+	$(ONE_THREAD) $(BIN)/python docs/measure/embedded.py
 
 sanitize: $(VENV)/test.stamp ## lives and a million random calls of the vehicle FMUs under AddressSanitizer and UBSan
 	FUZZ_CALLS=500000 $(BIN)/python -m pytest -q -s tests/test_fmu_sanitizers.py

@@ -24,7 +24,10 @@ CORE = [
     f"{name}.c"
     for name in ("network", "packed", "windowed", "carried", "carried_features", "residual")
 ]
-FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O3", "-ffp-contract=off"]
+FLAGS = [
+    *("-std=c11", "-Wall", "-Wextra", "-Werror", "-O3", "-ffp-contract=off"),
+    *("-fno-math-errno", "-fno-trapping-math"),
+]
 ALIGNMENT = 64
 LAYOUT_ROOM = 512  # bytes, more than a Network takes
 

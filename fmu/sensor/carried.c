@@ -8,14 +8,13 @@ typedef struct {
     float *features, *front, *both, *next, *dense;
 } Scratch;
 
-static size_t features_room(const Network *n) { return filled_up(n->feature_count, BLOCK_UNITS); }
+static size_t features_room(const Network *n) { return NETWORK_ROUND(n->feature_count, BLOCK_UNITS); }
+static size_t line_room(const Network *n) { return NETWORK_ROUND(n->depth * LINE, BLOCK_UNITS); }
 
-static size_t line_room(const Network *n) { return filled_up(n->depth * LINE, BLOCK_UNITS); }
-
-size_t carried_state_floats(const Network *n) { return HEAD + line_room(n) + 2 * n->padded; }
+size_t carried_state_floats(const Network *n) { return NETWORK_CARRIED_STATE(n->units, n->depth); }
 
 size_t carried_scratch_floats(const Network *n) {
-    return features_room(n) + BLOCK * (n->front.blocks + n->dense.blocks) + filled_up(n->front_units, BLOCK_UNITS) + 2 * n->padded;
+    return NETWORK_CARRIED_SCRATCH(n->feature_count, n->front_units, n->units, n->hidden);
 }
 
 static Scratch divided(const Network *n, float *scratch) {
@@ -24,7 +23,7 @@ static Scratch divided(const Network *n, float *scratch) {
     s.front = s.features + features_room(n);
     s.dense = s.front + BLOCK * n->front.blocks;
     s.both = s.dense + BLOCK * n->dense.blocks;
-    s.next = s.both + filled_up(n->front_units, BLOCK_UNITS) + n->padded;
+    s.next = s.both + NETWORK_ROUND(n->front_units, BLOCK_UNITS) + n->padded;
     return s;
 }
 

@@ -12,6 +12,7 @@
 
 #define LANES 8
 #define ROWS 3
+#define ROW_STRANDS 2
 #define WIDE 8
 #define STRANDS 1
 

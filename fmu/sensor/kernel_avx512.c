@@ -12,6 +12,7 @@
 
 #define LANES 16
 #define ROWS 6
+#define ROW_STRANDS 2
 #define WIDE 4
 #define STRANDS 2
 

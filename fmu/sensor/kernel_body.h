@@ -1,6 +1,7 @@
 /* The kernel, in terms of a Vector of LANES numbers and a few operations on it, which the file that includes this one defines:
- * load, store, splat, multiply, divide, times_plus (a b + c), limited (to +-most; a NaN stays one), and ROWS, the rows whose gates the
- * registers hold.
+ * load, store, splat, plus, multiply, divide, times_plus (a b + c), limited (to +-most; a NaN stays one); ROWS, the rows whose gates the
+ * registers hold; ROW_STRANDS, the sums side by side where there is one row only; WIDE and STRANDS, the vectors of a product and the sums of
+ * each.
  *
  * A register tile holds all four gates of LANES units in `count` rows, so that the cell follows straight from registers: the sums
  * never see memory. */
@@ -117,23 +118,29 @@ INLINE void advance_rows(const int count, Tile t) {
     UNROLLED for (int r = 0; r < count; ++r) advance_cell(sum[r], t.hidden + r * t.step, t.cell + r * t.step);
 }
 
-/* One row waits for its own sums; in two strands it waits half as long. */
+/* One row waits for its own sums; in several strands it waits less. */
 INLINE void advance_row(Tile t) {
-    Sums sum, odd;
-    UNROLLED for (int g = 0; g < GATES; ++g) sum.gate[g] = load(t.start + g * GATE_STEP), odd.gate[g] = splat(0.0f);
+    Sums sum[ROW_STRANDS];
+    UNROLLED for (int g = 0; g < GATES; ++g) {
+        sum[0].gate[g] = load(t.start + g * GATE_STEP);
+        UNROLLED for (int s = 1; s < ROW_STRANDS; ++s) sum[s].gate[g] = splat(0.0f);
+    }
     size_t k = 0;
-    for (; k + 2 <= t.depth; k += 2, t.matrix += 2 * BLOCK) {
-        const Vector x = splat(t.input[k]), next = splat(t.input[k + 1]);
-        UNROLLED for (int g = 0; g < GATES; ++g) {
-            sum.gate[g] = times_plus(x, load(t.matrix + g * GATE_STEP), sum.gate[g]);
-            odd.gate[g] = times_plus(next, load(t.matrix + BLOCK + g * GATE_STEP), odd.gate[g]);
+    for (; k + ROW_STRANDS <= t.depth; k += ROW_STRANDS, t.matrix += ROW_STRANDS * BLOCK) {
+        UNROLLED for (int s = 0; s < ROW_STRANDS; ++s) {
+            const Vector x = splat(t.input[k + s]);
+            UNROLLED for (int g = 0; g < GATES; ++g)
+                sum[s].gate[g] = times_plus(x, load(t.matrix + s * BLOCK + g * GATE_STEP), sum[s].gate[g]);
         }
     }
-    if (k < t.depth) {
-        UNROLLED for (int g = 0; g < GATES; ++g) sum.gate[g] = times_plus(splat(t.input[k]), load(t.matrix + g * GATE_STEP), sum.gate[g]);
+    for (; k < t.depth; ++k, t.matrix += BLOCK) {
+        const Vector x = splat(t.input[k]);
+        UNROLLED for (int g = 0; g < GATES; ++g) sum[0].gate[g] = times_plus(x, load(t.matrix + g * GATE_STEP), sum[0].gate[g]);
     }
-    UNROLLED for (int g = 0; g < GATES; ++g) sum.gate[g] = plus(sum.gate[g], odd.gate[g]);
-    advance_cell(sum, t.hidden, t.cell);
+    UNROLLED for (int s = 1; s < ROW_STRANDS; ++s) {
+        UNROLLED for (int g = 0; g < GATES; ++g) sum[0].gate[g] = plus(sum[0].gate[g], sum[s].gate[g]);
+    }
+    advance_cell(sum[0], t.hidden, t.cell);
 }
 
 static void advance_tile(size_t count, const Tile *tile) {

@@ -3,6 +3,7 @@
 
 #define LANES 4
 #define ROWS 1
+#define ROW_STRANDS 1
 #define WIDE 4
 #define STRANDS 1
 
@@ -22,16 +23,21 @@ static inline Vector splat(float x) {
     return v;
 }
 
-#define OF_EACH(expression)                       \
-    Vector v;                                     \
-    for (int l = 0; l < LANES; ++l) v.lane[l] = (expression); \
+/* Written out: not every compiler unrolls a loop over four. */
+#define EACH(of)                                         \
+    const Vector v = {{of(0), of(1), of(2), of(3)}}; \
     return v
+#define SUM(l) a.lane[l] + b.lane[l]
+#define PRODUCT(l) a.lane[l] * b.lane[l]
+#define QUOTIENT(l) a.lane[l] / b.lane[l]
+#define PRODUCT_AND_SUM(l) a.lane[l] * b.lane[l] + c.lane[l]
+#define LIMITED(l) x.lane[l] < -most ? -most : x.lane[l] > most ? most : x.lane[l]
 
-static inline Vector plus(Vector a, Vector b) { OF_EACH(a.lane[l] + b.lane[l]); }
-static inline Vector multiply(Vector a, Vector b) { OF_EACH(a.lane[l] * b.lane[l]); }
-static inline Vector divide(Vector a, Vector b) { OF_EACH(a.lane[l] / b.lane[l]); }
-static inline Vector times_plus(Vector a, Vector b, Vector c) { OF_EACH(a.lane[l] * b.lane[l] + c.lane[l]); }
-static inline Vector limited(Vector x, float most) { OF_EACH(x.lane[l] < -most ? -most : x.lane[l] > most ? most : x.lane[l]); }
+static inline Vector plus(Vector a, Vector b) { EACH(SUM); }
+static inline Vector multiply(Vector a, Vector b) { EACH(PRODUCT); }
+static inline Vector divide(Vector a, Vector b) { EACH(QUOTIENT); }
+static inline Vector times_plus(Vector a, Vector b, Vector c) { EACH(PRODUCT_AND_SUM); }
+static inline Vector limited(Vector x, float most) { EACH(LIMITED); }
 
 #include "kernel_body.h"
 

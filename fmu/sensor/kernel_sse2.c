@@ -6,6 +6,7 @@
 
 #define LANES 4
 #define ROWS 2
+#define ROW_STRANDS 2
 #define WIDE 8
 #define STRANDS 1
 

@@ -12,6 +12,17 @@
 
 enum { CHANNELS = 14, COMMANDS = 4, WHEELS = 4 };
 
+/* Room for memory that is fixed when a program is compiled, in floats of four bytes. `features` are 43 and five for each lead of the
+ * delay line, `depth` its length: the packed file's record has them. */
+#define NETWORK_ROUND(count, multiple) (((count) + (multiple) - 1) / (multiple) * (multiple))
+#define NETWORK_WINDOWED_STATE(window, units) (16 + 2 * ((window) - 1) * NETWORK_ROUND(units, 16))
+#define NETWORK_WINDOWED_SCRATCH(window, units, hidden) \
+    (NETWORK_ROUND(hidden, 64) + ((window) + 6) * NETWORK_ROUND(units, 16))
+#define NETWORK_CARRIED_STATE(units, depth) (16 + NETWORK_ROUND((depth) * 10, 16) + 2 * NETWORK_ROUND(units, 16))
+#define NETWORK_CARRIED_SCRATCH(features, front, units, hidden) \
+    (NETWORK_ROUND(features, 16) + NETWORK_ROUND(front, 64) + NETWORK_ROUND(hidden, 64) + NETWORK_ROUND(front, 16) + \
+     2 * NETWORK_ROUND(units, 16))
+
 /* start + matrix x, sixty-four sums to a block: matrix[blocks][depth][64], start[blocks][64]. */
 typedef struct {
     const float *matrix, *start;

@@ -47,7 +47,7 @@ typedef struct {
 
 static const void *take(Place *place, size_t bytes) {
     const size_t offset = place->offset;
-    place->offset += filled_up(bytes, ALIGNMENT);
+    place->offset += NETWORK_ROUND(bytes, ALIGNMENT);
     return place->blob + offset;
 }
 
@@ -61,7 +61,7 @@ static Layer layer(Place *place, size_t depth, size_t blocks, bool start) {
 }
 
 static Readout four(Place *place, size_t width, bool start) {
-    Readout r = {NULL, NULL, filled_up(width, BLOCK_UNITS)};
+    Readout r = {NULL, NULL, NETWORK_ROUND(width, BLOCK_UNITS)};
     r.weights = floats(place, WHEELS * r.width);
     if (start) r.start = floats(place, WHEELS);
     return r;
@@ -77,7 +77,7 @@ static void windowed_sections(Network *n, Place *place, bool residual) {
     n->forward_input = layer(place, CHANNELS, blocks, true);
     n->backward_input = layer(place, CHANNELS, blocks, true);
     n->lstm = layer(place, n->units, blocks, false);
-    n->dense = layer(place, 2 * n->padded, filled_up(n->hidden, BLOCK) / BLOCK, true);
+    n->dense = layer(place, 2 * n->padded, NETWORK_ROUND(n->hidden, BLOCK) / BLOCK, true);
     n->output = four(place, n->hidden, true);
 }
 
@@ -87,9 +87,9 @@ static void carried_sections(Network *n, Place *place) {
     n->feature_scale = floats(place, n->feature_count - DRIVING);
     n->input_mean = floats(place, n->feature_count);
     n->input_std = floats(place, n->feature_count);
-    n->front = layer(place, n->feature_count, filled_up(n->front_units, BLOCK) / BLOCK, true);
+    n->front = layer(place, n->feature_count, NETWORK_ROUND(n->front_units, BLOCK) / BLOCK, true);
     n->lstm = layer(place, n->front_units + n->units, n->padded / BLOCK_UNITS, true);
-    n->dense = layer(place, n->units, filled_up(n->hidden, BLOCK) / BLOCK, true);
+    n->dense = layer(place, n->units, NETWORK_ROUND(n->hidden, BLOCK) / BLOCK, true);
     n->output = four(place, n->hidden, true);
     n->deviation = four(place, n->hidden, true);
     n->straight = four(place, n->feature_count, false);
@@ -103,7 +103,7 @@ const char *network_open(Network *network, const void *blob, size_t bytes) {
     memset(&n, 0, sizeof n);
     n.kernel = best_kernel();
     n.units = h->units, n.hidden = h->hidden, n.warm_up = h->warm_up;
-    n.padded = filled_up(h->units, BLOCK_UNITS);
+    n.padded = NETWORK_ROUND(h->units, BLOCK_UNITS);
     n.window = h->kind == WINDOWED ? h->window : 1;
     n.front_units = h->front_units, n.leads = h->leads, n.depth = h->depth;
     n.feature_count = DRIVING + MOVING + DELAYED * n.leads;

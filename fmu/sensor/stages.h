@@ -23,7 +23,6 @@ void residual_channels(const Residual *r, float sample[CHANNELS]);
 
 float readout(const Readout *r, size_t wheel, const float *values);
 
-static inline size_t filled_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
 static inline float within(float x, float least, float most) { return x < least ? least : x > most ? most : x; }
 
 #endif

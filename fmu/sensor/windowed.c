@@ -18,11 +18,8 @@ typedef struct {
     float *gates, *dense, *both, *cell, *next;
 } Scratch;
 
-size_t windowed_state_floats(const Network *n) { return HEAD + 2 * (n->window - 1) * n->padded; }
-
-size_t windowed_scratch_floats(const Network *n) {
-    return BLOCK * (n->lstm.blocks + n->dense.blocks) + (n->window - 1 + 3) * n->padded;
-}
+size_t windowed_state_floats(const Network *n) { return NETWORK_WINDOWED_STATE(n->window, n->units); }
+size_t windowed_scratch_floats(const Network *n) { return NETWORK_WINDOWED_SCRATCH(n->window, n->units, n->hidden); }
 
 static Scratch divided(const Network *n, float *scratch) {
     Scratch s;
