@@ -126,7 +126,7 @@ def batch(ended: Sequence[Ended]) -> None:
     """Say on stderr what came out of several scenarios."""
     from cosim.tables import batch_table
 
-    table(batch_table([(str(one.job.scenario), one.exit_code, one.metrics) for one in ended]))
+    table(batch_table(ended))
     for note in dict.fromkeys(note for one in ended for note in one.notes):
         files = [str(one.job.scenario) for one in ended if note in one.notes]
         where = files[0] if len(files) == 1 else f"{len(files)} scenarios"

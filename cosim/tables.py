@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from cosim.metrics import (
     ESTIMATORS,
@@ -16,6 +16,9 @@ from cosim.metrics import (
 )
 from cosim.verdict import Verdict
 from sensor.metrics import LEAST_TRUTH_RMS
+
+if TYPE_CHECKING:
+    from cosim.batch import Ended
 
 NAMES: Final = {
     "sensor": "Sensor",
@@ -182,8 +185,8 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     return Table("Limits", ("metric", "run", "measured", "required", "verdict"), rows)
 
 
-def batch_table(ended: Sequence[tuple[str, int, Mapping[str, Any] | None]]) -> Table:
-    """Return one row per run of several scenarios: each one's file, exit code and metrics.json."""
+def batch_table(ended: Sequence[Ended]) -> Table:
+    """Return one row per run of several scenarios."""
     columns = (
         "scenario",
         "verdict",
@@ -194,24 +197,33 @@ def batch_table(ended: Sequence[tuple[str, int, Mapping[str, Any] | None]]) -> T
         "largest deviation [m]",
     )
     rows: list[tuple[str, ...]] = []
-    for file, code, metrics in ended:
-        if metrics is None:
-            rows.append((file, "error" if code > 1 else "FAILED", *["-"] * 5))
-            continue
-        verdicts = metrics["limits"]
-        for label, figures in metrics["runs"].items():
-            own = [verdict["passed"] for verdict in verdicts if verdict["run"] == label]
-            verdict = ("passed" if all(own) else "FAILED") if own else "no limits"
-            name = file if len(metrics["runs"]) == 1 else f"{file} ({label})"
-            cells = (
-                number(figure(figures, "simulated_s"), 1),
-                number(figure(figures, "real_time_factor"), 1),
-                number(figure(figures, "sensor.overall.rmse_m_s")),
-                number(figure(figures, "sensor.overall.accuracy_percent"), 1),
-                number(figure(figures, "largest_deviation_m"), 2),
-            )
-            rows.append((name, verdict, *cells))
+    for one in ended:
+        file = str(one.job.scenario)
+        if not one.runs:
+            rows.append((file, "error" if one.exit_code > 1 else "FAILED", *["-"] * 5))
+        for run in one.runs:
+            name = file if len(one.runs) == 1 else f"{file} ({run.label})"
+            rows.append((name, verdict_of(one, run.label), *_cells(one, run.label)))
     return Table("Scenarios", columns, tuple(rows))
+
+
+def verdict_of(ended: Ended, label: str) -> str:
+    """Return in a word what came of a run of a scenario."""
+    if ended.metrics is None or label not in ended.metrics["runs"]:
+        return "error"
+    own = [verdict["passed"] for verdict in ended.metrics["limits"] if verdict["run"] == label]
+    return ("passed" if all(own) else "FAILED") if own else "no limits"
+
+
+def _cells(ended: Ended, label: str) -> tuple[str, ...]:
+    figures = ended.metrics["runs"].get(label, {}) if ended.metrics is not None else {}
+    return (
+        number(figure(figures, "simulated_s"), 1),
+        number(figure(figures, "real_time_factor"), 1),
+        number(figure(figures, "sensor.overall.rmse_m_s")),
+        number(figure(figures, "sensor.overall.accuracy_percent"), 1),
+        number(figure(figures, "largest_deviation_m"), 2),
+    )
 
 
 def _against(first: Mapping[str, Any], figures: Mapping[str, Any], path: str) -> str:

@@ -53,9 +53,10 @@ class Variable:
 ORDERS: Final = tuple(
     Variable(f"Parrot.{name}", 400 + i, "parameter", None, "Float64", 0.0, (0.0, 1e6))
     for i, name in enumerate(
-        ("BadAt", "BadOutput", "BadValue", "FailAt", "FailStatus", "FailWords", "StopAt", "Chatter")
+        ("BadAt", "BadOutput", "BadValue", "FailAt", "FailStatus", "FailWords", "StopAt",
+         "Chatter", "AbortAt", "SegfaultAt", "HangAt", "ExitAt", "HangAtStart", "OnlySoft")
     )
-)
+)  # fmt: skip
 CLOCK: Final = (Variable("Parrot.Time", 300), Variable("Parrot.Step", 301))
 
 

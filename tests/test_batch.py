@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from foreign_fmu import Variable, own_variables, parrot
 from loop_rig import write_scenario
 
 from cosim.batch import Ended, Job, find_scenarios, plan, run_all
+from cosim.batch.job import RunEnd
 from cosim.cli import main
 from cosim.errors import InputError
 from cosim.tables import batch_table
@@ -21,6 +23,7 @@ from cosim.tables import batch_table
 TIMES = ("wall_time_s", "real_time_factor", "timing")  # of metrics.json: how long the machine took
 PASSES = "[{metric: largest_deviation_m, max: 1}]"
 FAILS = "[{metric: sensor.overall.rmse_m_s, max: 1e-9}]"
+OF_ALL = "[{metric: fixed.simulated_s, min: 1}, {signal: time, max: 1}]"
 CLOSED_LOOP = "[{kind: passive}, {kind: skyhook, feedback: truth}]"
 
 
@@ -47,8 +50,9 @@ class Batch:
 
 @pytest.fixture(scope="module")
 def batch(tmp_path_factory: pytest.TempPathFactory) -> Batch:
-    """Three that end well or with a failed limit, one whose FMU fails with words, one whose FMU
-    takes its process down, and a YAML file that is no scenario.
+    """Three that end well or with a failed limit, one whose FMU fails with words, two whose FMU
+    takes its process down, one of them in the second of three runs, and a YAML file that is no
+    scenario.
     """
     folder = tmp_path_factory.mktemp("batch")
     below = folder / "set" / "more"
@@ -63,6 +67,10 @@ def batch(tmp_path_factory: pytest.TempPathFactory) -> Batch:
     for name, parameters in (("words", words), ("dies", "{Far: 1}")):
         vehicle = f"{{fmu: p.fmu, parameters: {parameters}}}"
         write_scenario(below, name=name, sections={"vehicle": vehicle})
+    aborts = "{fmu: p.fmu, parameters: {Parrot.AbortAt: 57, Parrot.OnlySoft: 1}}"
+    fixed = "[{kind: passive}, {kind: fixed, command: 0}, {kind: fixed, command: 1, name: hard}]"
+    sections = {"vehicle": aborts, "controllers": fixed, "limits": OF_ALL}
+    write_scenario(below, name="aborts", sections=sections)
     (folder / "set" / "recipe.yaml").write_text("runs: []\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -72,26 +80,32 @@ def batch(tmp_path_factory: pytest.TempPathFactory) -> Batch:
 
 def test_each_ends_in_its_own_way_and_the_worst_decides(batch: Batch) -> None:
     codes = {name: one["exit_code"] for name, one in batch.ended().items()}
-    assert codes == {"good": 0, "bad_limit": 1, "closed": 0, "words": 3, "dies": 3}
+    assert codes == {
+        "good": 0, "bad_limit": 1, "closed": 0, "words": 3, "dies": 3, "aborts": 3,
+    }  # fmt: skip
     assert batch.result.exit_code == 3
 
 
 def test_failures_are_said_in_a_sentence(batch: Batch) -> None:
     said = batch.result.stderr
     assert "error: set/more/words.yaml: p.fmu: could not step at t = 0.19 s: the parrot" in said
-    assert "error: set/more/dies.yaml: the process of the run crashed (SIGSEGV, memory" in said
+    assert "error: set/more/dies.yaml: the run crashed (SIGSEGV, memory that is not its" in said
+    assert ") before its start\n" in said
     assert "set/recipe.yaml has no road, so it is no scenario; left out" in said
-    assert "3 of 5 scenarios FAILED; results in results" in said
+    assert "4 of 6 scenarios FAILED; results in results" in said
     assert "Traceback" not in said
 
 
 def test_progress_counts_and_the_table_has_a_row_per_run(batch: Batch) -> None:
     said = batch.result.stderr
-    assert all(f"[{n}/5] set/" in said for n in range(1, 6))
+    assert all(f"[{n}/6] set/" in said for n in range(1, 7))
     rows = [line.split() for line in said.splitlines() if line.startswith("  set/")]
     assert [(row[0], row[1]) for row in rows] == [
         ("set/bad_limit.yaml", "FAILED"),
         ("set/good.yaml", "passed"),
+        ("set/more/aborts.yaml", "(passive)"),
+        ("set/more/aborts.yaml", "(fixed)"),
+        ("set/more/aborts.yaml", "(hard)"),
         ("set/more/closed.yaml", "(passive)"),
         ("set/more/closed.yaml", "(skyhook_truth)"),
         ("set/more/dies.yaml", "error"),
@@ -102,7 +116,7 @@ def test_progress_counts_and_the_table_has_a_row_per_run(batch: Batch) -> None:
 def test_every_scenario_has_its_files(batch: Batch) -> None:
     results = batch.folder / "results"
     assert {path.name for path in results.iterdir()} == {
-        "good", "bad_limit", "closed", "words", "dies",
+        "good", "bad_limit", "closed", "words", "dies", "aborts",
     }  # fmt: skip
     assert (results / "good" / "report.html").exists()
     assert (results / "closed" / "skyhook_truth" / "signals.csv").exists()
@@ -110,6 +124,35 @@ def test_every_scenario_has_its_files(batch: Batch) -> None:
     assert len((results / "words" / "signals.csv").read_text().splitlines()) == 1 + 20
     versions = json.loads((results / "good" / "versions.json").read_text())
     assert versions["command"] == "cosim run set/good.yaml --set driver.style=aggressive"
+
+
+def test_a_run_that_crashes_leaves_its_rows_and_the_other_runs(batch: Batch) -> None:
+    """The FMU aborts in the step from t = 0.56 s, before which row 56 was recorded."""
+    results, said = batch.folder / "results" / "aborts", batch.result.stderr
+    sentence = (
+        r"error: set/more/aborts\.yaml: the run fixed crashed \(SIGABRT, it gave up\) in \w+ "
+        r"\(fmi\.py, line \d+\) after the sample at t = 0\.56 s; it printed: parrot\.c: assertion "
+        r"failed: it is only resting; the 57 samples until then are in results/aborts/fixed/"
+        r"signals\.csv\n"
+    )
+    assert re.search(sentence, said)
+    rows = {
+        name: (results / name / "signals.csv").read_text().splitlines()
+        for name in ("passive", "fixed", "hard")
+    }
+    assert {name: len(lines) for name, lines in rows.items()} == {
+        "passive": 1 + 101, "fixed": 1 + 57, "hard": 1 + 101,
+    }  # fmt: skip
+    assert rows["fixed"][-1].startswith("0.56")
+    assert rows["fixed"][0] == rows["passive"][0]
+    metrics = json.loads((results / "metrics.json").read_text())
+    assert list(metrics["runs"]) == ["passive", "hard"]
+    assert [(v["run"], v["passed"]) for v in metrics["limits"]] == [
+        ("passive", True),
+        ("hard", True),
+    ]
+    assert (results / "report.html").exists()
+    assert not list(batch.folder.rglob("*.part"))
 
 
 @pytest.mark.parametrize("name", ["good", "closed"])
@@ -192,19 +235,15 @@ def test_two_scenarios_must_not_share_a_folder(tmp_path: Path) -> None:
 
 
 def test_the_table_tells_passed_failed_and_no_limits() -> None:
-    def metrics(*passed: bool) -> dict[str, Any]:
+    def ended(name: str, *passed: bool) -> Ended:
         limits = [{"run": "passive", "passed": one} for one in passed]
-        return {"runs": {"passive": {"simulated_s": 3.0}}, "limits": limits}
+        metrics = {"runs": {"passive": {"simulated_s": 3.0}}, "limits": limits}
+        return Ended(Job(Path(name), Path()), metrics=metrics, runs=(RunEnd("passive", {}),))
 
-    table = batch_table(
-        [
-            ("a", 0, metrics(True)),
-            ("b", 1, metrics(True, False)),
-            ("c", 0, metrics()),
-            ("d", 3, None),
-        ]
-    )
-    assert [row[1] for row in table.rows] == ["passed", "FAILED", "no limits", "error"]
+    died = Ended(Job(Path("d"), Path()), 3, runs=(RunEnd("passive", exit_code=3),))
+    unfit = Ended(Job(Path("e"), Path()), 3)
+    table = batch_table([ended("a", True), ended("b", True, False), ended("c"), died, unfit])
+    assert [row[1] for row in table.rows] == ["passed", "FAILED", "no limits", "error", "error"]
     assert table.rows[0][2:4] == ("3.0", "-")
 
 

@@ -20,7 +20,7 @@ from cosim.check.finding import Report
 from cosim.check.trials.bench import swing
 from cosim.check.trials.job import Channel, Job
 from cosim.check.trials.rules import other_value
-from cosim.isolation import Children, Death, WorkError
+from cosim.isolation import Children, Death, Watch, WorkError
 
 pytestmark = NEEDS_BINUTILS
 
@@ -31,14 +31,13 @@ class Shared(Children):
     def __exit__(self, *_: object) -> None:
         """Stay."""
 
-    def again(self, timeout: float, modules: tuple[str, ...]) -> Shared:
-        self._timeout = timeout
+    def again(self, modules: tuple[str, ...]) -> Shared:
         return self
 
 
 @pytest.fixture(scope="module")
 def shared() -> Iterator[Shared]:
-    children = Shared(20.0, dynamic.MODULES)
+    children = Shared(dynamic.MODULES)
     yield children
     Children.__exit__(children)
 
@@ -332,10 +331,10 @@ def test_an_fmu_that_fails_only_once_in_a_while_keeps_its_reference(
     """A failure in one trial says what the FMU was doing."""
     run = Children.run
 
-    def fail(self: Children, work: object, job: Job) -> object:
+    def fail(self: Children, work: object, job: Job, watch: Watch) -> object:
         if job.trial == "token":
             return Death("crash", "SIGILL", "fmi3Instantiate")
-        return run(self, work, job)
+        return run(self, work, job, watch)
 
     monkeypatch.setattr(Children, "run", fail)
     alone(check(fmus[3]), "crash", "SIGILL", "fmi3Instantiate, when a wrong token is offered")

@@ -16,7 +16,7 @@ import isolated_work as work
 import pytest
 
 from cosim.errors import CosimError
-from cosim.isolation import Children, Death, WorkError
+from cosim.isolation import Children, Death, Watch, WorkError
 from cosim.isolation.death import death_of, last_line
 
 NEEDS_FORK = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
@@ -31,7 +31,7 @@ def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def children() -> Iterator[Children]:
-    with Children(10.0) as made:
+    with Children() as made:
         yield made
 
 
@@ -49,7 +49,7 @@ def test_answers_come_home_each_from_another_process(
 
 @pytest.mark.parametrize("forks", [True, False])
 def test_a_crash_is_told_with_signal_call_words_and_place(forks: bool) -> None:
-    with Children(10.0, forks=forks) as children:
+    with Children(forks=forks) as children:
         death = children.run(work.abort, 0)
         assert isinstance(death, Death)
         assert (death.kind, death.signal) == ("crash", "SIGABRT")
@@ -83,9 +83,9 @@ def test_a_process_that_is_killed_from_outside(children: Children) -> None:
 
 @pytest.mark.parametrize("forks", [True, False])
 def test_a_hang_ends_after_the_timeout_and_tells_where(forks: bool) -> None:
-    with Children(0.5, forks=forks) as children:
+    with Children(forks=forks) as children:
         begin = time.monotonic()
-        death = children.run(work.sleep_in_c, 600.0)
+        death = children.run(work.sleep_in_c, 600.0, Watch(0.5))
         assert time.monotonic() - begin < 30.0
         assert isinstance(death, Death)
         assert (death.kind, death.call, death.timeout) == ("hang", "the long step", 0.5)
@@ -96,18 +96,17 @@ def test_a_hang_ends_after_the_timeout_and_tells_where(forks: bool) -> None:
 def test_whoever_goes_on_does_not_hang(tmp_path: Path) -> None:
     """Each step is shorter than the timeout, all of them are longer."""
     grown = tmp_path / "grown"
-    with Children(0.7) as children:
-        assert children.run(work.goes_on, 8) == "there"
+    with Children() as children:
+        assert children.run(work.goes_on, 8, Watch(0.7)) == "there"
         pulse: Callable[[], int] = lambda: grown.stat().st_size if grown.exists() else 0  # noqa: E731
-        assert children.run(work.grows, str(grown), pulse) == "there"
-        death = children.run(work.grows, str(tmp_path / "unwatched"))
+        assert children.run(work.grows, str(grown), Watch(0.7, pulse)) == "there"
+        death = children.run(work.grows, str(tmp_path / "unwatched"), Watch(0.7))
         assert isinstance(death, Death)
         assert death.kind == "hang"
 
 
-def test_without_a_timeout_it_may_take_as_long_as_it_likes() -> None:
-    with Children(None) as children:
-        assert children.run(work.sleep_in_c, 0.5) is None
+def test_without_a_timeout_it_may_take_as_long_as_it_likes(children: Children) -> None:
+    assert children.run(work.sleep_in_c, 0.5) is None
 
 
 def test_an_exception_is_a_mistake_of_the_work(children: Children) -> None:
@@ -118,7 +117,7 @@ def test_an_exception_is_a_mistake_of_the_work(children: Children) -> None:
 
 def test_a_process_that_does_not_start(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    with Children(1.0) as children, pytest.raises(WorkError, match="did not start"):
+    with Children() as children, pytest.raises(WorkError, match="did not start"):
         children.run(work.double, 1.0)
 
 
@@ -152,7 +151,7 @@ def _written(file: Path) -> list[int]:
 @NEEDS_FORK
 def test_an_interrupt_ends_the_work_and_all_that_it_has_started(tmp_path: Path) -> None:
     file, deaths = tmp_path / "pids", []
-    with Children(None) as children:
+    with Children() as children:
         thread = threading.Thread(
             target=lambda: deaths.append(children.run(work.has_a_child, str(file)))
         )
@@ -171,7 +170,7 @@ def test_nothing_goes_on_when_whoever_asked_is_gone(tmp_path: Path) -> None:
     file = tmp_path / "pids"
     program = (
         "import isolated_work as work\nfrom cosim.isolation import Children\n"
-        f"with Children(None) as children: children.run(work.has_a_child, {str(file)!r})"
+        f"with Children() as children: children.run(work.has_a_child, {str(file)!r})"
     )
     root = Path(__file__).parents[1]
     path = os.pathsep.join([str(root), str(root / "tests")])

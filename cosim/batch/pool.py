@@ -1,8 +1,4 @@
-"""Jobs in processes of their own, one thread each, several at a time.
-
-A scenario gives the same files as on its own, bit for bit but for the times that it took. One that
-fails does not stop the others, nor does an FMU that takes its process with it.
-"""
+"""Jobs in processes of their own, one thread each, several at a time."""
 
 from __future__ import annotations
 
@@ -14,35 +10,39 @@ from functools import partial
 from queue import SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
-from cosim.batch import worker
-from cosim.batch.job import Ended, Job
-from cosim.isolation import Children, Death, Journal
+from cosim.isolation import Children, Death, Journal, Watch
 
 J = TypeVar("J")
 E = TypeVar("E")
-Tell = Callable[[Ended], None]
-MODULES: Final = ("cosim.assembly", "cosim.compare", "cosim.report", "cosim.run", "onnxruntime")
+MODULES: Final = (
+    "cosim.assembly", "cosim.batch.conclusion", "cosim.compare", "cosim.report", "cosim.run",
+    "onnxruntime",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Task(Generic[J, E]):
-    """What a process does with a job, what is said of a job whose process died, and what changes as
-    long as a job goes on, beside the calls in its journal.
+    """What a process does with a job, what is said of a job whose process died, how long a job may
+    stand still [s], and what changes as long as it goes on, beside the calls in its journal.
     """
 
     work: Callable[[J, Journal], E]
     died: Callable[[J, Death], E]
+    timeout: float | None = None
     pulse: Callable[[J], Any] = lambda job: None
+
+    def done(self, children: Children, job: J) -> E:
+        """Return what comes of a job."""
+        answer = children.run(self.work, job, Watch(self.timeout, partial(self.pulse, job)))
+        return self.died(job, answer) if isinstance(answer, Death) else answer
 
 
 class Pool:
-    """Processes that take jobs; a context manager. `timeout` is how long a job may stand still [s],
-    None for as long as it likes.
-    """
+    """Processes that take jobs, started when they are needed; a context manager."""
 
-    def __init__(self, processes: int, timeout: float | None = None) -> None:
+    def __init__(self, processes: int) -> None:
         self._stack = ExitStack()
-        self._children = [Children(timeout, MODULES) for _ in range(processes)]
+        self._children = [Children(MODULES) for _ in range(processes)]
 
     def __enter__(self) -> Pool:
         for children in self._children:
@@ -55,16 +55,27 @@ class Pool:
     def through(
         self, task: Task[J, E], jobs: Sequence[J], tell: Callable[[E], None] = lambda ended: None
     ) -> dict[J, E]:
-        """Return what comes of the jobs, begun in their order; `tell` hears of each as it ends.
+        """Return what comes of the jobs, begun in their order; `tell` hears of each as it ends."""
+        return self.each(task.done, jobs, tell, len(self._children))
 
-        An interrupt ends those under way, and `task.died` hears of them before it goes on.
+    def each(
+        self,
+        work: Callable[[Children, J], E],
+        jobs: Sequence[J],
+        tell: Callable[[E], None],
+        at_once: int,
+    ) -> dict[J, E]:
+        """Return what `work`, in a thread here with processes to use, makes of each of the jobs, so
+        many at once.
+
+        An interrupt ends the processes under way, and their deaths are heard of before it goes on.
         """
         idle: SimpleQueue[Children] = SimpleQueue()
-        for children in self._children:
+        for children in self._children[:at_once]:
             idle.put(children)
         ended: dict[J, E] = {}
-        with ThreadPoolExecutor(len(self._children)) as threads:
-            waiting = {threads.submit(_do, task, job, idle): job for job in jobs}
+        with ThreadPoolExecutor(at_once) as threads:
+            waiting = {threads.submit(_with_idle, work, job, idle): job for job in jobs}
             try:
                 for future in as_completed(waiting):
                     ended[waiting[future]] = future.result()
@@ -81,35 +92,12 @@ class Pool:
             children.interrupt()
 
 
-def _do(task: Task[J, E], job: J, idle: SimpleQueue[Children]) -> E:
+def _with_idle(work: Callable[[Children, J], E], job: J, idle: SimpleQueue[Children]) -> E:
     children = idle.get()
     try:
-        answer = children.run(task.work, job, partial(task.pulse, job))
+        return work(children, job)
     finally:
         idle.put(children)
-    return task.died(job, answer) if isinstance(answer, Death) else answer
-
-
-def run_all(
-    jobs: Sequence[Job], processes: int, tell: Tell = lambda ended: None
-) -> tuple[list[Ended], bool]:
-    """Check all jobs, then run them; return them in their order, and whether they were run.
-
-    Where a check finds something, nothing is run and the jobs come back with their problems. `tell`
-    hears of each job that has been run.
-    """
-    with Pool(min(processes, len(jobs))) as pool:
-        checked = pool.through(Task(worker.check, _died), jobs)
-        if any(ended.problems for ended in checked.values()):
-            return [checked[job] for job in jobs], False
-        # The longest first: what is begun last should not be what all wait for.
-        order = sorted(jobs, key=lambda job: -checked[job].longest_s)
-        ended = pool.through(Task(worker.drive, _died), order, tell)
-    return [ended[job] for job in jobs], True
-
-
-def _died(job: Job, death: Death) -> Ended:
-    return Ended(job, 3, (sentence(death),))
 
 
 def sentence(death: Death) -> str:

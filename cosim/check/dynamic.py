@@ -20,7 +20,7 @@ from cosim.check.parts import Variable, number, whole
 from cosim.check.schema import fmpy_folder
 from cosim.check.trials.job import Answer, Channel, Job
 from cosim.check.trials.perform import perform
-from cosim.isolation import Children, Death
+from cosim.isolation import Children, Death, Watch
 
 ODD_FOLDER: Final = "a b Prüfstand 道路"
 STEPS: Final = 200  # of the default experiment where the XML gives no step size
@@ -68,8 +68,8 @@ def run_trials(archive: Archive, description: Description, report: Report, timeo
             return
         (folder / "resources").mkdir(exist_ok=True)
         job = job_of(description, folder, folder / library, Path(name).resolve())
-        with Children(timeout, MODULES) as children:
-            _Trials(job, report, children, archive.read(library)).run()
+        with Children(MODULES) as children:
+            _Trials(job, report, children, archive.read(library)).run(Watch(timeout))
 
 
 class _Trials:
@@ -78,8 +78,9 @@ class _Trials:
     def __init__(self, job: Job, report: Report, children: Children, binary: bytes) -> None:
         self.job, self.report, self.children, self.binary = job, report, children, binary
 
-    def run(self) -> None:
+    def run(self, watch: Watch) -> None:
         """Run all trials that the earlier ones leave a sense to."""
+        self._watch = watch
         if self._trial("default"):
             self.report.not_judged.append("everything that needs it to run with its defaults")
             return
@@ -107,7 +108,7 @@ class _Trials:
 
     def _trial(self, trial: str, quiet: bool = False) -> bool:
         """Run one trial, add its findings; return whether the rest makes no sense."""
-        answer = self.children.run(perform, replace(self.job, trial=trial))
+        answer = self.children.run(perform, replace(self.job, trial=trial), self._watch)
         if isinstance(answer, Death):
             if not quiet:
                 words = f"{_words(answer)}, {TRIALS[trial]}"

@@ -4,8 +4,8 @@ A crash or a hang of an FMU takes down the one process that runs it; what it was
 a journal that outlives it. Nothing heavy is imported here.
 """
 
-from cosim.isolation.children import Children, WorkError
+from cosim.isolation.children import Children, Watch, WorkError
 from cosim.isolation.death import Death
 from cosim.isolation.journal import Journal
 
-__all__ = ["Children", "Death", "Journal", "WorkError"]
+__all__ = ["Children", "Death", "Journal", "Watch", "WorkError"]

@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, ClassVar, Final, TypeVar, cast
 
@@ -37,19 +38,29 @@ class WorkError(CosimError):
     exit_code: ClassVar[int] = 3
 
 
+@dataclass(frozen=True)
+class Watch:
+    """When a work hangs: for `timeout` [s] neither a call is noted in its journal nor `pulse`
+    returns something new. Without a timeout it may take as long as it likes.
+    """
+
+    timeout: float | None = None
+    pulse: Callable[[], Any] = lambda: None
+
+
+NO_WATCH: Final = Watch()
+
+
 class Children:
     """Does one work after another, each in a process of its own; a context manager, so that no
     process is left behind.
 
-    `timeout` is how long nothing may happen [s], None for as long as it likes; `modules` are
-    imported before the first work; `forks` False starts a fresh Python for each, as systems
-    without fork need.
+    `modules` are imported before the first work; `forks` False starts a fresh Python for each, as
+    systems without fork need.
     """
 
-    def __init__(
-        self, timeout: float | None, modules: Sequence[str] = (), forks: bool = True
-    ) -> None:
-        self._timeout, self._modules, self._forks = timeout, tuple(modules), forks
+    def __init__(self, modules: Sequence[str] = (), forks: bool = True) -> None:
+        self._modules, self._forks = tuple(modules), forks
         self._server: subprocess.Popen[str] | None = None
         self._lines: queue.Queue[str] = queue.Queue()
         self._folder = tempfile.TemporaryDirectory(prefix="cosim-work-", ignore_cleanup_errors=True)
@@ -66,23 +77,17 @@ class Children:
         """Let the work under way, and all that follows, end as interrupted; from another thread."""
         self._interrupted.set()
 
-    def run(
-        self,
-        work: Callable[[J, Journal], E],
-        job: J,
-        pulse: Callable[[], Any] = lambda: None,
-    ) -> E | Death:
+    def run(self, work: Callable[[J, Journal], E], job: J, watch: Watch = NO_WATCH) -> E | Death:
         """Do `work(job, journal)` in a process of its own and return what it returns, or its death.
 
-        It hangs when for the timeout neither a call is noted in its journal nor `pulse` returns
-        something new. Raises `WorkError` if it did not begin, or raised an exception.
+        Raises `WorkError` if it did not begin, or raised an exception.
         """
         folder = Path(self._folder.name)
         for name in (ANSWER, PRINTED, STACK):
             (folder / name).unlink(missing_ok=True)
         new_journal(folder / FILE)
         (folder / WORK).write_bytes(pickle.dumps((work, job)))
-        code, ended = self._watch(folder, pulse)
+        code, ended = self._watch(folder, watch)
         answer = _answer(folder) if code == 0 else None
         if isinstance(answer, Broken):
             raise WorkError(f"{_name(work)} is at fault:\n{answer.traceback}")
@@ -91,15 +96,17 @@ class Children:
         _, call, message = read_journal(folder / FILE)
         printed, stack = _text(folder / PRINTED), _text(folder / STACK)
         if ended:
-            hung = Death("hang", "", call, message, last_line(printed), stack, self._timeout or 0.0)
-            return Death("interrupted", call=call) if self._interrupted.is_set() else hung
+            if self._interrupted.is_set():
+                return Death("interrupted", call=call)
+            waited = watch.timeout or 0.0
+            return Death("hang", "", call, message, last_line(printed), stack, waited)
         if not (call or printed or stack or code < 0):
             raise WorkError(f"{_name(work)} did not begin (exit code {code})")
         return death_of(code, call, message, printed, stack)
 
     # ------------------------------------------------------------ below: processes
 
-    def _watch(self, folder: Path, pulse: Callable[[], Any]) -> tuple[int, bool]:
+    def _watch(self, folder: Path, watch: Watch) -> tuple[int, bool]:
         """Send a work; return the exit code and whether it had to be killed."""
         server = self._serving()
         with contextlib.suppress(OSError):  # it has ended; that there is no answer tells
@@ -107,7 +114,7 @@ class Children:
             cast(IO[str], server.stdin).flush()
         child = self._started()
         try:
-            return self._until_its_end(child, lambda: (read_journal(folder / FILE)[0], pulse()))
+            return self._until_its_end(child, folder / FILE, watch)
         except BaseException:
             _kill(child)
             raise
@@ -123,17 +130,17 @@ class Children:
             raise WorkError(f"the process for the work did not start (exit code {code})")
         return int(line)
 
-    def _until_its_end(self, child: int, pulse: Callable[[], Any]) -> tuple[int, bool]:
+    def _until_its_end(self, child: int, journal: Path, watch: Watch) -> tuple[int, bool]:
         """Return the exit code of a work and whether it had to be killed."""
-        last, since = pulse(), time.monotonic()
+        last, since = None, time.monotonic()
         while True:
             try:
                 line = self._lines.get(timeout=_LOOK)
             except queue.Empty:
-                now = pulse()
+                now = read_journal(journal)[0], watch.pulse()
                 if now != last:
                     last, since = now, time.monotonic()
-                hangs = self._timeout is not None and time.monotonic() - since > self._timeout
+                hangs = watch.timeout is not None and time.monotonic() - since > watch.timeout
                 if hangs or self._interrupted.is_set():
                     if hangs:
                         _ask_where(child)

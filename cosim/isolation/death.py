@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import signal
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Literal
 
 _MEANINGS: Final = {
@@ -14,6 +15,8 @@ _MEANINGS: Final = {
     "SIGKILL": "SIGKILL, ended from outside, such as for want of memory",
 }  # fmt: skip
 _FRAME: Final = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+) in (?P<function>\S+)')
+_PACKAGE: Final = Path(__file__).resolve().parents[1]
+_SERVER: Final = _PACKAGE / "isolation"  # below every work
 _LONGEST: Final = 200  # characters of what a process printed last
 
 
@@ -51,12 +54,19 @@ class Death:
 
     @property
     def frame(self) -> str:
-        """The Python function that was under way, such as `step (fmi.py, line 133)`, or nothing."""
-        found = _FRAME.search(self.stack)
-        if found is None:
+        """The function of this package that was under way, such as `step (fmi.py, line 133)`; of
+        another one where it was none of ours, nothing where that is not known.
+        """
+        frames = list(_FRAME.finditer(self.stack))
+        ours = [frame for frame in frames if _is_ours(Path(frame["file"]))]
+        if not frames:
             return ""
-        file = re.split(r"[/\\]", found["file"])[-1]
-        return f"{found['function']} ({file}, line {found['line']})"
+        frame = (ours or frames)[0]
+        return f"{frame['function']} ({Path(frame['file']).name}, line {frame['line']})"
+
+
+def _is_ours(file: Path) -> bool:
+    return file.is_relative_to(_PACKAGE) and not file.is_relative_to(_SERVER)
 
 
 def death_of(code: int, call: str, message: str, printed: str, stack: str) -> Death:

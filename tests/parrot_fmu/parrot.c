@@ -6,10 +6,12 @@
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 
-enum { OUTPUT = 100, ECHO = 200, TIME = 300, STEP = 301, VALUES = 500 };
+enum { FIRST_DAMPER = 3, OUTPUT = 100, ECHO = 200, TIME = 300, STEP = 301, VALUES = 500 };
 enum { BAD_AT = 400, BAD_OUTPUT, BAD_VALUE, FAIL_AT, FAIL_STATUS, FAIL_WORDS, STOP_AT, CHATTER };
+enum { ABORT_AT = 408, SEGFAULT_AT, HANG_AT, EXIT_AT, HANG_AT_START, ONLY_SOFT };
 
 typedef struct {
     double value[VALUES];
@@ -66,11 +68,34 @@ static int set(Parrot *p, const unsigned vr[], size_t n, const double in[])
     return 0;
 }
 
+static void hang(void)
+{
+    for (volatile int on = 1; on;)
+        ;
+}
+
+static void die(const Parrot *p)
+{
+    if (p->value[ONLY_SOFT] && p->value[FIRST_DAMPER])
+        return;
+    if (p->steps == p->value[ABORT_AT]) {
+        fprintf(stderr, "parrot.c: assertion failed: it is only resting\n");
+        abort();
+    }
+    if (p->steps == p->value[SEGFAULT_AT])
+        *(volatile int *)(size_t)p->steps = 0;
+    if (p->steps == p->value[HANG_AT])
+        hang();
+    if (p->steps == p->value[EXIT_AT])
+        exit(0);
+}
+
 static int step(Parrot *p, double t, double h)
 {
     p->value[TIME] = t;
     p->value[STEP] = h;
     p->steps++;
+    die(p);
     if (p->steps != p->value[FAIL_AT])
         return 0;
     if (p->value[FAIL_WORDS])
@@ -80,6 +105,8 @@ static int step(Parrot *p, double t, double h)
 
 static int begin(Parrot *p)
 {
+    if (p->value[HANG_AT_START])
+        hang();
     if (p->value[CHATTER])
         say(p, 0, "the parrot has woken up");
     return 0;
