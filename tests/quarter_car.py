@@ -71,7 +71,7 @@ class QuarterCar:
                 out[:] = law
             else:
                 told.velocity[:], told.acceleration[:], relative[:] = dz, a, dz - du
-                law(told, relative, out)
+                law(told, relative, np.zeros(4), out)
             wanted = self.least + out[0] * (self.greatest - self.least)
             damping += follow * (wanted - damping)
             road = 1e-3 * np.sin(w * k * h)

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.control.body import Body
+from cosim.control.skyhook import HARD_COMMAND
 
 Array = npt.NDArray[np.float64]
 
@@ -28,10 +29,10 @@ CROSSOVER_HZ: Final = 1.9  # sqrt(2) times the body's resonance, where both laws
 class Add:
     """Acceleration-driven damping; `hard` is the command of the hard state."""
 
-    def __init__(self, hard: float = 1.0) -> None:
+    def __init__(self, hard: float = HARD_COMMAND) -> None:
         self._hard = hard
 
-    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+    def __call__(self, body: Body, relative: Array, deviation: Array, out: Array) -> None:
         """Write the commands (4,) to `out`; see `cosim.control.law.Law`."""
         pairs = zip(body.acceleration.tolist(), relative.tolist(), strict=True)
         for i, (acceleration, extension) in enumerate(pairs):
@@ -41,10 +42,10 @@ class Add:
 class SkyhookAdd:
     """SH-ADD; `hard` is the command of the hard state, `crossover` alpha / 2 pi [Hz]."""
 
-    def __init__(self, hard: float = 1.0, crossover: float = CROSSOVER_HZ) -> None:
+    def __init__(self, hard: float = HARD_COMMAND, crossover: float = CROSSOVER_HZ) -> None:
         self._hard, self._alpha = hard, 2.0 * pi * crossover
 
-    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+    def __call__(self, body: Body, relative: Array, deviation: Array, out: Array) -> None:
         """Write the commands (4,) to `out`; see `cosim.control.law.Law`."""
         motion = zip(
             body.velocity.tolist(), body.acceleration.tolist(), relative.tolist(), strict=True

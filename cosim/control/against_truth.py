@@ -8,6 +8,8 @@ from typing import Any, Final
 from cosim.metrics import figure
 from cosim.scenario.controllers import Controller, Law, Passive
 
+LEAST_GAIN: Final = 0.02
+"""Reduction of the weighted acceleration below which there is nothing to keep: a ratio of noise."""
 _COMFORT: Final = "comfort.weighted_acceleration_m_s2"
 _OWN: Final = {"name", "feedback", "estimator", "network", "fallback", "initial_command", "latency"}
 
@@ -19,8 +21,8 @@ def against_truth(
     and a passive run stand beside:
 
     gain_kept_percent: of the reduction of the weighted acceleration against the passive car that
-    the truth brings; tyre_load_percent and deflection_percent: change of the dynamic tyre load and
-    of the deflection against those with the truth.
+    the truth brings, left out where that is below 2 %; tyre_load_percent and deflection_percent:
+    change of the dynamic tyre load and of the deflection against those with the truth.
     """
     passive = next((c for c in controllers if isinstance(c, Passive)), None)
     laws = [c for c in controllers if isinstance(c, Law)]
@@ -50,11 +52,17 @@ def _figures(
     passive: Mapping[str, Any], truth: Mapping[str, Any], run: Mapping[str, Any]
 ) -> dict[str, float]:
     found = {}
-    base, best, reached = (figure(one, _COMFORT) for one in (passive, truth, run))
-    if base is not None and best is not None and reached is not None and best < base:
-        found["gain_kept_percent"] = 100.0 * (base - reached) / (base - best)
+    kept = _gain_kept(*(figure(one, _COMFORT) for one in (passive, truth, run)))
+    if kept is not None:
+        found["gain_kept_percent"] = kept
     for name, path in (("tyre_load", "tyre_load_rms_n"), ("deflection", "deflection_rms_m")):
         one, other = figure(truth, f"comfort.{path}"), figure(run, f"comfort.{path}")
         if one and other is not None:
             found[f"{name}_percent"] = 100.0 * (other / one - 1.0)
     return found
+
+
+def _gain_kept(passive: float | None, truth: float | None, run: float | None) -> float | None:
+    if passive is None or truth is None or run is None or truth > (1.0 - LEAST_GAIN) * passive:
+        return None
+    return 100.0 * (passive - run) / (passive - truth)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cosim.control.add import Add, SkyhookAdd
 from cosim.control.body import Body
+from cosim.control.cautious import CautiousSkyhook
 from cosim.control.damper_map import DamperMap
 from cosim.control.fallback import Fallback, FallbackParameters
 from cosim.control.fixed import FixedDampers
@@ -38,6 +39,8 @@ def _law(chosen: settings.LawSettings, dampers: DamperMap, body: Body) -> Law:
     match chosen:
         case settings.Skyhook():
             return Skyhook(dampers, chosen.gain_ns_per_m)
+        case settings.CautiousSkyhook():
+            return CautiousSkyhook(dampers, chosen.gain_ns_per_m, chosen.least_deviation_m_s)
         case settings.TwoStateSkyhook():
             return TwoStateSkyhook(chosen.hard_command)
         case settings.Add():

@@ -32,10 +32,15 @@ class DamperMap:
         self.tables = tables
         self._soft, self._hard = Curve(*tables.soft).force, Curve(*tables.hard).force
 
+    def ends(self, wheel: int, v: float) -> tuple[float, float]:
+        """Return the forces at an extension speed, soft and hard."""
+        scale = self.tables.scale[wheel]
+        return scale * self._soft(v)[0], scale * self._hard(v)[0]
+
     def force(self, wheel: int, v: float, command: float) -> float:
         """Return the force at an extension speed under a command."""
-        soft, hard = self._soft(v)[0], self._hard(v)[0]
-        return self.tables.scale[wheel] * (soft + command * (hard - soft))
+        soft, hard = self.ends(wheel, v)
+        return soft + command * (hard - soft)
 
     def command(self, wheel: int, wanted: float, v: float) -> float:
         """Return the command whose force comes nearest to `wanted` [N] at an extension speed.
@@ -44,11 +49,11 @@ class DamperMap:
         """
         if wanted * v <= 0.0:
             return 0.0
-        soft, hard = self._soft(v)[0], self._hard(v)[0]
+        soft, hard = self.ends(wheel, v)
         span = hard - soft
         if abs(span) <= LEAST_SPAN:
             return 0.0
-        return min(max((wanted / self.tables.scale[wheel] - soft) / span, 0.0), 1.0)
+        return min(max((wanted - soft) / span, 0.0), 1.0)
 
     def commands(self, wanted: Array, v: Array, out: Array) -> None:
         """Write the commands (4,) for wanted forces (4,) [N] at extension speeds (4,) to `out`."""

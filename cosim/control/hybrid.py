@@ -35,7 +35,7 @@ class Hybrid:
         self._dampers = dampers
         self._sky, self._ground = share * gain, (1.0 - share) * gain
 
-    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+    def __call__(self, body: Body, relative: Array, deviation: Array, out: Array) -> None:
         """Write the commands (4,) to `out`; see `cosim.control.law.Law`."""
         pairs = zip(body.velocity.tolist(), relative.tolist(), strict=True)
         for i, (velocity, extension) in enumerate(pairs):

@@ -12,13 +12,16 @@ from cosim.control.sample import Sample
 
 Array = npt.NDArray[np.float64]
 
+_EXACT = np.zeros(4)
+
 
 class Law(Protocol):
     """What is commanded for a motion."""
 
-    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+    def __call__(self, body: Body, relative: Array, deviation: Array, out: Array) -> None:
         """Write the commands (4,), 0 soft to 1 hard, to `out`: from the motion of the body and the
-        suspension velocities `relative` (4,) [m/s], positive in extension, FL FR RL RR.
+        suspension velocities `relative` (4,) [m/s], positive in extension, FL FR RL RR, with the
+        standard `deviation` (4,) [m/s] of their errors, NaN where it is not known.
         """
 
 
@@ -41,7 +44,7 @@ class LawController:
         """Return the commands (4,), 0 soft to 1 hard, the same array every time."""
         self._body.step(sample.measured)
         if self._on_truth:
-            self._law(self._body, sample.truth, self.command)
+            self._law(self._body, sample.truth, _EXACT, self.command)
         elif sample.valid:
-            self._law(self._body, sample.estimate, self.command)
+            self._law(self._body, sample.estimate, sample.deviation, self.command)
         return self.command

@@ -41,7 +41,7 @@ class ModalSkyhook:
         self.shares = np.linalg.pinv(mixing.T) * [gains.heave, gains.roll, gains.pitch]
         self._wanted = np.zeros(4)
 
-    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+    def __call__(self, body: Body, relative: Array, deviation: Array, out: Array) -> None:
         """Write the commands (4,) to `out`; see `cosim.control.law.Law`."""
         np.matmul(self.shares, body.modes, out=self._wanted)
         self._dampers.commands(self._wanted, relative, out)

@@ -20,6 +20,7 @@ from cosim.control.damper_map import DamperMap
 Array = npt.NDArray[np.float64]
 
 SKYHOOK_GAIN: Final = 3500.0  # N s/m, between comfort and tyre load: docs/closed-loop.md
+HARD_COMMAND: Final = 0.3  # two states; harder ones lose comfort: docs/closed-loop.md
 
 
 class Skyhook:
@@ -29,7 +30,7 @@ class Skyhook:
         self._dampers, self._gain = dampers, gain
         self._wanted = np.zeros(4)
 
-    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+    def __call__(self, body: Body, relative: Array, deviation: Array, out: Array) -> None:
         """Write the commands (4,) to `out`; see `cosim.control.law.Law`."""
         np.multiply(self._gain, body.velocity, out=self._wanted)
         self._dampers.commands(self._wanted, relative, out)
@@ -38,10 +39,10 @@ class Skyhook:
 class TwoStateSkyhook:
     """Two-state skyhook: `hard` where the damper would slow the body down, else soft."""
 
-    def __init__(self, hard: float = 1.0) -> None:
+    def __init__(self, hard: float = HARD_COMMAND) -> None:
         self._hard = hard
 
-    def __call__(self, body: Body, relative: Array, out: Array) -> None:
+    def __call__(self, body: Body, relative: Array, deviation: Array, out: Array) -> None:
         """Write the commands (4,) to `out`; see `cosim.control.law.Law`."""
         pairs = zip(body.velocity.tolist(), relative.tolist(), strict=True)
         for i, (velocity, extension) in enumerate(pairs):

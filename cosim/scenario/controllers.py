@@ -8,9 +8,10 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from cosim.control.add import CROSSOVER_HZ
+from cosim.control.cautious import CAUTIOUS_GAIN, LEAST_DEVIATION
 from cosim.control.hybrid import SKYHOOK_SHARE
 from cosim.control.modal import ModalGains
-from cosim.control.skyhook import SKYHOOK_GAIN
+from cosim.control.skyhook import HARD_COMMAND, SKYHOOK_GAIN
 from cosim.scenario.latency import Latency
 from cosim.scenario.model import NAME_PATTERN, Model, with_unit
 from cosim.scenario.sensor import EstimatorName, Sensor
@@ -158,11 +159,29 @@ class Skyhook(Gained):
     kind: Literal["skyhook"]
 
 
+class CautiousSkyhook(Gained):
+    """Skyhook that weighs how uncertain the estimate is."""
+
+    kind: Literal["cautious_skyhook"]
+    gain_ns_per_m: float = Field(
+        default=CAUTIOUS_GAIN,
+        gt=0,
+        description="skyhook damping of one corner",
+        json_schema_extra=with_unit("N s/m"),
+    )
+    least_deviation_m_s: float = Field(
+        default=LEAST_DEVIATION,
+        ge=0,
+        description="of the suspension velocity's error, also where less is predicted",
+        json_schema_extra=with_unit("m/s"),
+    )
+
+
 class TwoState(Law):
     """A law that knows soft and hard alone."""
 
     hard_command: float = Field(
-        default=1.0, gt=0, le=1, description="damper command of the hard state, 1 hardest"
+        default=HARD_COMMAND, gt=0, le=1, description="damper command of the hard state, 1 hardest"
     )
 
 
@@ -223,7 +242,7 @@ class ModalSkyhook(Law):
     )
 
 
-LawSettings = Skyhook | TwoStateSkyhook | Add | SkyhookAdd | Hybrid | ModalSkyhook
+LawSettings = Skyhook | CautiousSkyhook | TwoStateSkyhook | Add | SkyhookAdd | Hybrid | ModalSkyhook
 Controller = Annotated[Passive | Fixed | LawSettings, Field(discriminator="kind")]
 
 

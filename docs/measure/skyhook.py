@@ -12,7 +12,7 @@ from cosim.assembly import assemble
 from cosim.dataset import NoSensor
 from cosim.scenario.load import load
 
-SCENARIO = Path(__file__).parents[2] / "scenarios" / "closed_loop_class_c_50.yaml"
+SCENARIO = Path(__file__).parents[2] / "scenarios" / "closed_loop" / "closed_loop_class_c_50.yaml"
 GAINS = (1000.0, 2000.0, 3000.0, 3500.0, 4000.0, 6000.0, 8000.0, 12000.0)
 
 
