@@ -12,7 +12,7 @@ SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/* fmu/sensor/*)
 
-.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness faults manoeuvres roads benchmarks embedded sanitize clean study retrain-check
+.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness faults manoeuvres roads benchmarks benchmark-network embedded sanitize clean study retrain-check
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -123,9 +123,12 @@ roads: $(VENV)/test.stamp ## surfaces, bumpy road and road scenarios: the tables
 
 benchmarks: $(VENV)/test.stamp ## real-time factors, loop overhead beside FMPy's, the network, a batch, the vehicle's instructions (needs valgrind)
 	$(ONE_THREAD) $(BIN)/python tests/benchmarks/bench_loop.py
-	$(BIN)/python tests/benchmarks/bench_sensor.py
+	$(ONE_THREAD) $(BIN)/python tests/benchmarks/bench_network.py
 	$(BIN)/python tests/benchmarks/bench_batch.py
 	$(BIN)/python tests/benchmarks/bench_instructions.py
+
+benchmark-network: $(VENV)/test.stamp ## the networks in every run time: docs/performance-network.md (about five minutes; OpenVINO and valgrind if they are there)
+	$(ONE_THREAD) $(BIN)/python tests/benchmarks/bench_network.py --write
 
 clean:
 	rm -rf build dist results cosim/fmus $(VENV)/*.stamp

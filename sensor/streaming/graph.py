@@ -82,9 +82,10 @@ def _operations(network: PackedNetwork) -> list[Operation]:
         operation("Split", "both_gates one_each", "begin_gates backward_gates", axis=0),
         operation("Gemm", "hidden forward_R begin_gates", "flight_gates", transB=1),
         operation("Concat", "begin_gates flight_gates backward_gates", "gates", axis=0),
-        operation("Split", "gates three_and_one", "opening candidate", axis=1),
-        operation("Sigmoid", "opening", "open"),
-        operation("Split", "open each", "input_open output_open forget_open", axis=1),
+        operation("Split", "gates each", "input_gate output_gate forget_gate candidate", axis=1),
+        operation("Sigmoid", "input_gate", "input_open"),
+        operation("Sigmoid", "output_gate", "output_open"),
+        operation("Sigmoid", "forget_gate", "forget_open"),
         operation("Tanh", "candidate", "bounded"),
         operation("Mul", "forget_open cell", "kept"),
         operation("Mul", "input_open bounded", "gained"),
@@ -113,9 +114,8 @@ def _constants(network: PackedNetwork) -> Arrays:
         gates[f"sample_{part}"] = np.concatenate(both)
     std, mean = (a[f"output_{name}"].astype(np.float64) for name in ("std", "mean"))
     wholes = {
-        "two_rows": [2, 4 * units], "one_each": [1, 1], "three_and_one": [3 * units, units],
-        "each": 3 * [units], "complete_row": [window - 1], "end_row": [window + 1],
-        "one_row": [1, 2 * units],
+        "two_rows": [2, 4 * units], "one_each": [1, 1], "each": 4 * [units],
+        "complete_row": [window - 1], "end_row": [window + 1], "one_row": [1, 2 * units],
     }  # fmt: skip
     return {
         **gates,
