@@ -53,7 +53,8 @@ static unsigned some_reference(Kind kind)
         return (unsigned)draw();
     if (chance(30))
         return TIME_REFERENCE;
-    return table->first + (unsigned)below(table->count + (chance(20) ? 2 : 0));
+    const size_t n = table->count + (chance(20) ? 2 : 0);
+    return table->first + (unsigned)(n ? below(n) : 0);
 }
 
 static const char *some_text(void)

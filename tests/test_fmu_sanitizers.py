@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import shipped_fmus as fmus
 from fmu_face import FIXTURE, ROOT, build, toolchain
 from vehicle_rig import cosine_bump, straight_road
 
@@ -38,6 +39,20 @@ def lag(tmp_path_factory: pytest.TempPathFactory) -> Programs:
 @pytest.fixture(scope="module")
 def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Programs:
     return programs(ROOT / "fmu" / "vehicle", tmp_path_factory.mktemp("vehicle"))
+
+
+@pytest.fixture(scope="module")
+def sensor(tmp_path_factory: pytest.TempPathFactory) -> Programs:
+    return programs(ROOT / "fmu" / "sensor", tmp_path_factory.mktemp("sensor"))
+
+
+@pytest.fixture(params=fmus.KINDS)
+def network(request: pytest.FixtureRequest) -> Iterator[tuple[str, str]]:
+    """Where the programs find a small network, and the token that goes with it."""
+    fmu = fmus.Shipped(f"small {request.param}", 3)
+    with fmus.unzipped(fmu) as folder:
+        token = fmus.xml(fmu).get("instantiationToken")
+        yield f"--resources={folder / 'resources'}", f"--token={token}"
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +85,22 @@ def test_lives_of_the_vehicle_leave_nothing_behind(
     """On a road, moving: 2000 instances and 20 whole lives."""
     arguments = ("--lives=20", "--instances=2000", f"Road.File={road}", "Init.Velocity=15")
     assert "no fault" in run(vehicle["smoke", version], *arguments)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_lives_of_a_sensor_leave_nothing_behind(
+    sensor: Programs, version: int, network: tuple[str, str]
+) -> None:
+    arguments = ("--lives=20", "--instances=2000", "Car.vx=15", "Car.az=-2", *network)
+    assert "20 lives of Sensor and 2000 instances more, no fault" in run(
+        sensor["smoke", version], *arguments
+    )
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_random_calls_of_a_sensor(sensor: Programs, version: int, network: tuple[str, str]) -> None:
+    said = run(sensor["fuzz", version], "1", str(CALLS), *network)
+    assert said == f"FMI {version}: {CALLS} random calls of Sensor, no fault\n"
 
 
 @pytest.mark.parametrize("version", [2, 3])

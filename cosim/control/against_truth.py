@@ -11,7 +11,10 @@ from cosim.scenario.controllers import Controller, Law, Passive
 LEAST_GAIN: Final = 0.02
 """Reduction of the weighted acceleration below which there is nothing to keep: a ratio of noise."""
 _COMFORT: Final = "comfort.weighted_acceleration_m_s2"
-_OWN: Final = {"name", "feedback", "estimator", "network", "fallback", "initial_command", "latency"}
+_OWN: Final = {
+    *("name", "feedback", "estimator", "network", "fmu"),
+    *("fallback", "initial_command", "latency"),
+}
 
 
 def against_truth(
