@@ -1,4 +1,4 @@
-"""The vehicle FMUs in masters that are not ours: the same results, bit for bit.
+"""The FMUs in masters that are not ours: the vehicle's results bit for bit, and its estimates.
 
 The step is a power of two: libcosim counts nanoseconds and passes the difference of two
 communication points as the step. With 10 ms that is 10 ms only to rounding, and so are the results.
@@ -12,11 +12,15 @@ import foreign_masters
 import numpy as np
 import numpy.typing as npt
 import pytest
-from foreign_masters import Task
+import shipped_fmus as fmus
+from foreign_masters import Pair, Task
 from vehicle_rig import INPUTS, cosine_bump, output_names, straight_road
 
 from cosim.fmi import Description, Slave
+from cosim.recorder import held
 from cosim.vehicle import builtin_fmu
+from sensor.channels import CHANNEL_NAMES, COMMANDS, OUTPUT_NAMES, PASSIVE_COMMAND
+from sensor.estimators import open_network
 
 Array = npt.NDArray[np.float64]
 
@@ -98,3 +102,53 @@ def test_a_command_beyond_its_range_does_not_stop_a_master(
     """It gets a Warning and goes on with the limit."""
     version, (_, rows) = driven
     np.testing.assert_array_equal(rows, ours(version, road, to_the_ends(commands())))
+
+
+# ---------------------------------------------------------------- the sensor beside the vehicle
+
+STEP = 0.01  # as a user would take it
+CHANNELS = tuple(CHANNEL_NAMES)
+ESTIMATES = tuple(OUTPUT_NAMES)
+DAMPERS = tuple(command.name for command in COMMANDS)
+MASTERS = [("fmpy", 2), ("fmpy", 3), *PAIRS]
+
+
+@pytest.mark.parametrize("model", fmus.KINDS)
+@pytest.mark.parametrize(("master", "version"), MASTERS, ids=lambda value: str(value))
+def test_vehicle_and_sensor_connected(master: str, version: int, model: str, road: str) -> None:
+    """The estimate of the sample at t_k stands at the sensor's output at t_k+1, and is what the
+    network says of the vehicle's channels at t_k.
+    """
+    inputs = commands()[:200]
+    sensor = fmus.Shipped(model, version)
+    own = DAMPERS if sensor.carried else ()
+    pair = Pair(
+        builtin_fmu(version), sensor.path, STEP, {"Road.File": road, "Init.Velocity": 12.0},
+        INPUTS, own, np.hstack([inputs, inputs[:, 4 : 4 + len(own)]]).tolist(), CHANNELS, ESTIMATES,
+    )  # fmt: skip
+    found = np.array(foreign_masters.run_pair(master, pair))
+    wanted = estimates(sensor.network, channels(version, road, inputs), inputs[:, 4:])
+    counted = np.isfinite(wanted[:, 0])
+    assert counted.sum() >= 150
+    np.testing.assert_allclose(found[counted], wanted[counted], rtol=0.0, atol=1e-5)
+    assert np.ptp(found[counted]) > 0.1
+
+
+def channels(version: int, road: str, inputs: Array) -> Array:
+    """The vehicle's channels at the beginning of each step (steps, 14)."""
+    slave = Slave(Description(builtin_fmu(version)), INPUTS, CHANNELS)
+    slave.inputs[:] = START
+    slave.initialise({"Road.File": road, "Init.Velocity": 12.0})
+    rows = np.empty((len(inputs), len(CHANNELS)))
+    for k, values in enumerate(inputs):
+        slave.read()
+        rows[k] = slave.outputs
+        slave.inputs[:] = values
+        slave.step(k, STEP)
+    slave.close()
+    return rows
+
+
+def estimates(network: Path, measured: Array, command: Array) -> Array:
+    """The network's own estimates, with the command that was held until each sample."""
+    return open_network(network).apply(measured, held(command, np.full(4, PASSIVE_COMMAND)))
