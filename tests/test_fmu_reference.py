@@ -74,7 +74,7 @@ def test_another_master_meets_the_result_bit_for_bit(fmu: fmus.Shipped) -> None:
         output_interval=times["stepSize"],
     )  # fmt: skip
     every = (len(result) - 1) // (len(expected) - 1)
-    assert len(expected) == 65
+    assert len(expected) == (65 if fmu.model == "vehicle" else 33)
     np.testing.assert_array_equal(result[::every], expected)
 
 
@@ -85,7 +85,7 @@ def test_the_experiment_is_a_drive(fmu: fmus.Shipped) -> None:
     assert set(table(fmu, inputs).dtype.names or ()) == {"time"} | {
         v.name for v in fmus.variables(fmu).values() if v.causality == "input"
     }
-    assert driven["time"].tolist() == [k / 16 for k in range(65)]
+    assert driven["time"].tolist() == [k / 16 for k in range(len(driven))]
     if fmu.model != "vehicle":
         assert np.ptp(driven["VRel.FL"]) > 0.01
         return
