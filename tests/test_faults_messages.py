@@ -124,6 +124,20 @@ def test_outages_have_their_mean_length_and_share() -> None:
     assert lost.mean() == pytest.approx(0.25, abs=4 * spread)
 
 
+def test_a_ramp_lets_the_share_of_missing_samples_grow() -> None:
+    lost = missing(share=0.6, ramp_s=SAMPLES * H)
+    for quarter in range(4):
+        found = int(lost[quarter * SAMPLES // 4 : (quarter + 1) * SAMPLES // 4].sum())
+        share = 0.6 * (quarter + 0.5) / 4
+        assert stats.binomtest(found, SAMPLES // 4, share).pvalue > UNLIKELY
+
+
+def test_outages_begin_in_their_steady_state() -> None:
+    fault = {"kind": "dropout", "channels": "Car.az", "fill": "nan", "share": 0.3, "outage_s": 0.5}
+    lost = [bool(np.isnan(through(varied(1), fault, seed=seed)[0, AZ])) for seed in range(600)]
+    assert stats.binomtest(sum(lost), 600, 0.3).pvalue > UNLIKELY
+
+
 def test_a_sample_that_is_missing_is_nan_or_the_last_that_came() -> None:
     channels = varied(300)
     fields = {"kind": "dropout", "channels": "imu", "share": 0.5, "start_s": 1.0, "end_s": 2.0}

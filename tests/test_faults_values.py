@@ -63,6 +63,17 @@ def test_noise_is_white_and_normal_with_its_rms() -> None:
     np.testing.assert_allclose(quarters, 1.0, atol=4 * 2 / np.sqrt(SAMPLES / 2))
 
 
+def test_a_ramp_lets_noise_and_spikes_grow() -> None:
+    ramp = {"channels": "Car.az", "ramp_s": SAMPLES * H}
+    share = np.arange(SAMPLES) / SAMPLES
+    noise = errors(SAMPLES, {"kind": "noise", "rms": 0.3, **ramp})
+    scaled = noise[1:] / (0.3 * share[1:])
+    assert stats.kstest(scaled, "norm").pvalue > UNLIKELY
+    spikes = errors(SAMPLES, {"kind": "spikes", "height": 7.0, "rate_hz": 5.0, **ramp})
+    hit = spikes != 0
+    np.testing.assert_allclose(np.abs(spikes[hit]), 7.0 * share[hit], rtol=1e-12)
+
+
 def test_channels_have_noise_of_their_own_that_does_not_depend_on_the_others() -> None:
     both = through(
         np.zeros((SAMPLES, 14)), {"kind": "noise", "channels": "accelerations", "rms": 1.0}

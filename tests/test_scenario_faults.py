@@ -127,7 +127,12 @@ def test_the_schema_takes_what_the_program_takes(tmp_path: Path) -> None:
     ]
     scenario = {"name": "a", "road": {"track": "hockenheim"}, "faults": good}
     jsonschema.validate(scenario, json_schema())
-    bad = [{"kind": "noise", "channels": "Car.az"}, {"kind": "drift", "channels": 3, "rate": 1}]
+    bad = [
+        {"kind": "noise", "channels": "Car.az"},
+        {"kind": "drift", "channels": 3, "rate": 1},
+        {"kind": "gain", "channels": ["imu", "Car.azz"], "factor": 2},
+        {"kind": "gain", "channels": [], "factor": 2},
+    ]
     for fault in bad:
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**scenario, "faults": [fault]}, json_schema())

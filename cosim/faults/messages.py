@@ -18,8 +18,8 @@ class _Past:
     """The last samples; reads them between two, on the straight line through both."""
 
     def __init__(self, longest: float) -> None:
-        """Keep `longest` samples and what is needed to interpolate."""
-        self._rows = np.zeros((math.ceil(longest) + 2, len(CHANNELS)))
+        """Keep the newest sample and those of up to `longest` samples before."""
+        self._rows = np.zeros((math.ceil(longest) + 1, len(CHANNELS)))
         self._read = zeros()
 
     def keep(self, k: int, channels: Array) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
-from pydantic import BeforeValidator, Field, ValidationInfo
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from cosim.check.unit_names import readings
@@ -52,13 +52,12 @@ def _channels(value: object) -> object:
     return tuple(names)
 
 
+_NAME: Final[dict[str, Any]] = {"enum": [*GROUPS, *CHANNEL_NAMES], "type": "string"}
 Channels = Annotated[
     tuple[str, ...],
-    BeforeValidator(_channels, json_schema_input_type=str | tuple[str, ...]),
-    Field(
-        description="a channel, a group, or a list of them",
-        json_schema_extra={"examples": [*GROUPS, *CHANNEL_NAMES]},
-    ),
+    BeforeValidator(_channels),
+    WithJsonSchema({"anyOf": [_NAME, {"items": _NAME, "minItems": 1, "type": "array"}]}),
+    Field(description="a channel, a group, or a list of them"),
 ]
 
 
