@@ -26,7 +26,10 @@ void model_log(const Model *m, ModelStatus status, const char *category, const c
 
 Plant *probe_new(void) {
     Plant *plant = calloc(1, sizeof *plant);
-    if (plant) plant->model.v = model_start;
+    if (plant) {
+        plant->model.v = model_start;
+        plant->model.resources = "";
+    }
     return plant;
 }
 
