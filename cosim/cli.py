@@ -174,6 +174,28 @@ def inspect(path: Path, as_json: bool, every: bool) -> None:
         run_inspection(path, as_json, every)
 
 
+@main.command()
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--output",
+    metavar="FILE.html",
+    default="results/compare.html",
+    show_default=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Where the page goes.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
+def compare(runs: tuple[Path, ...], output: Path, as_json: bool) -> None:
+    """Put runs side by side: a table, and a page with their spectra and signals.
+
+    RUN is a folder that 'cosim run' has written, for all runs in it, or that of a single run below.
+    """
+    with failures_as_exit_codes():
+        from cosim.comparison.command import run as run_comparison
+
+        run_comparison(runs, output, as_json, "cosim " + shlex.join(sys.argv[1:]))
+
+
 @main.command("export-ssp")
 @click.argument("scenario")
 @click.option(

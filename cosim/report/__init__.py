@@ -36,7 +36,7 @@ class ReportError(CosimError):
 
 def write_report(outcome: Outcome, versions: Mapping[str, Any], path: Path) -> None:
     """Write the report to `path`; raises `ReportError` where uplot-python is not installed."""
-    script, style = _uplot()
+    script, style = uplot()
     acting = outcome.scenario.acting_faults
     page = _page().render(
         outcome=outcome,
@@ -51,7 +51,7 @@ def write_report(outcome: Outcome, versions: Mapping[str, Any], path: Path) -> N
         uplot_style=style,
         script=_template("report.js"),
         style=_template("report.css"),
-        data=_json({"runs": [_signals(run, acting) for run in outcome.runs]}),
+        data=as_script({"runs": [_signals(run, acting) for run in outcome.runs]}),
     )
     path.write_text(page, encoding="utf-8")
 
@@ -132,7 +132,7 @@ def _base64(column: npt.NDArray[np.float64]) -> str:
     return base64.b64encode(column.astype("<f4").tobytes()).decode("ascii")
 
 
-def _json(value: Any) -> str:
+def as_script(value: Any) -> str:
     """Return JSON that may stand inside a script element."""
     return json.dumps(value, allow_nan=False).replace("<", "\\u003c")
 
@@ -141,7 +141,7 @@ def _template(name: str) -> str:
     return (resources.files("cosim.report") / "templates" / name).read_text(encoding="utf-8")
 
 
-def _uplot() -> tuple[str, str]:
+def uplot() -> tuple[str, str]:
     """Return uPlot's script and style as installed."""
     try:
         static = resources.files(import_module("uplot")) / "static"
