@@ -17,7 +17,14 @@
 #define UNROLLED
 #endif
 
+#if defined(__GNUC__)
+#define FETCH(address) __builtin_prefetch((address), 0, 2) /* into the second-level cache */
+#else
+#define FETCH(address) (void)(address)
+#endif
+
 #define GATES 4
+#define CACHE_LINE 16 /* numbers */
 #define PARTS (BLOCK_UNITS / LANES)
 #define GATE_STEP (LANES < 8 ? 8 : LANES)
 
@@ -95,11 +102,14 @@ INLINE void advance_cell(Sums gates, float *hidden, float *cell) {
     store(hidden, output_of(&s, c));
 }
 
-/* A part of a block, for rows from the first one on. */
+/* A part of a block, for rows from the first one on. `soon` is what the next block needs, and `soon_step` is 0 once all of it has been
+ * asked for: a large matrix comes from the third-level cache, and must be under way before it is needed. */
 typedef struct {
     const float *matrix, *start, *input;
     size_t depth, input_step, step;
     float *hidden, *cell;
+    const float *soon;
+    size_t soon_step;
 } Tile;
 
 INLINE void advance_rows(const int count, Tile t) {
@@ -107,8 +117,9 @@ INLINE void advance_rows(const int count, Tile t) {
     UNROLLED for (int r = 0; r < count; ++r) {
         UNROLLED for (int g = 0; g < GATES; ++g) sum[r].gate[g] = load(t.start + g * GATE_STEP);
     }
-    for (size_t k = 0; k < t.depth; ++k, t.matrix += BLOCK) {
+    for (size_t k = 0; k < t.depth; ++k, t.matrix += BLOCK, t.soon += t.soon_step) {
         Vector x[ROWS];
+        FETCH(t.soon);
         UNROLLED for (int r = 0; r < count; ++r) x[r] = splat(t.input[r * t.input_step + k]);
         UNROLLED for (int g = 0; g < GATES; ++g) {
             const Vector weight = load(t.matrix + g * GATE_STEP);
@@ -163,6 +174,7 @@ static void advance_tile(size_t count, const Tile *tile) {
 
 /* All rows of a part of a block, in tiles as equal as they can be. */
 static void advance_part(Tile tile, size_t rows) {
+    const float *soon_end = tile.soon + tile.depth * BLOCK;
     for (size_t tiles = (rows + ROWS - 1) / ROWS; tiles > 0; --tiles) {
         const size_t count = (rows + tiles - 1) / tiles;
         advance_tile(count, &tile);
@@ -170,15 +182,19 @@ static void advance_part(Tile tile, size_t rows) {
         tile.input += count * tile.input_step;
         tile.hidden += count * tile.step;
         tile.cell += count * tile.step;
+        tile.soon += tile.depth * tile.soon_step;
+        if (tile.soon == soon_end) tile.soon = tile.matrix, tile.soon_step = 0;
     }
 }
 
 static void advance(const Layer *layer, const float *start, const Rows *rows) {
+    const size_t size = layer->depth * BLOCK;
     for (size_t b = 0; b < layer->blocks; ++b)
         for (size_t p = 0; p < PARTS; ++p) {
-            const size_t unit = b * BLOCK_UNITS + p * LANES;
-            const Tile tile = {layer->matrix + b * layer->depth * BLOCK + part_place(p), start + b * BLOCK + part_place(p), rows->input,
-                               layer->depth, rows->input_step, rows->step, rows->hidden + unit, rows->cell + unit};
+            const size_t unit = b * BLOCK_UNITS + p * LANES, next = b + 1 < layer->blocks ? b + 1 : 0;
+            const Tile tile = {layer->matrix + b * size + part_place(p), start + b * BLOCK + part_place(p), rows->input, layer->depth,
+                               rows->input_step, rows->step, rows->hidden + unit, rows->cell + unit, layer->matrix + next * size,
+                               p ? 0 : CACHE_LINE};
             advance_part(tile, rows->count);
         }
 }
