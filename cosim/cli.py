@@ -101,6 +101,65 @@ def run(
     sys.exit(code)
 
 
+@main.command("test")
+@click.argument(
+    "paths", metavar="PATH...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@click.option(
+    "--junitxml",
+    "junit",
+    metavar="FILE",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the verdicts as JUnit XML, the figures as properties.",
+)
+@click.option("--accept", is_flag=True, help="Make what comes out now the goldens.")
+@click.option(
+    "--output-dir",
+    metavar="DIR",
+    default="results",
+    show_default=True,
+    type=click.Path(path_type=Path),
+    help="Where the results go, to DIR/SCENARIO each.",
+)
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(1),
+    help="Run up to N at the same time, as many as there are cores by default.",
+)
+@click.option(
+    "--timeout",
+    metavar="S",
+    default=60.0,
+    show_default=True,
+    type=click.FloatRange(min=0, min_open=True),
+    help="Wall time in s without a new sample after which a run counts as hanging.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print a list of the metrics as JSON.")
+def test_scenarios(
+    paths: tuple[Path, ...],
+    junit: Path | None,
+    accept: bool,
+    output_dir: Path,
+    jobs: int | None,
+    timeout: float,
+    as_json: bool,
+) -> None:
+    """Test scenarios by their limits and goldens, each PATH a YAML file or a folder of them.
+
+    Each run has a process of its own: a crash or a hang of an FMU is a failed test, and what was
+    recorded until then is on disk. Exit code 0 if all passed, 1 if one failed, 2 for bad input.
+    """
+    one_thread()
+    with failures_as_exit_codes():
+        from cosim.regression.command import Options
+        from cosim.regression.command import run as run_tests
+
+        options = Options(output_dir, jobs or cores(), timeout, accept, junit, as_json)
+        code = run_tests(paths, options)
+    sys.exit(code)
+
+
 @main.command()
 @click.argument("fmus", metavar="FMU...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print the reports as JSON on stdout.")

@@ -61,6 +61,15 @@ def run_of(limit: Bounds) -> str:
     return str(limit.metric or limit.signal).partition(".")[0]
 
 
+def asked_of(name: str, runs: Iterable[str]) -> dict[str, str]:
+    """Return by run what a figure or a signal is called there: the same in all, or what follows the
+    name of the one run that it begins with.
+    """
+    label, _, rest = name.partition(".")
+    runs = list(runs)
+    return {label: rest} if label in runs else dict.fromkeys(runs, name)
+
+
 def check_metric(
     metric: str, labels: Sequence[str], manoeuvre: str | None = None, faults: Sequence[str] = ()
 ) -> str | None:
@@ -136,10 +145,7 @@ def evaluate(
     """
     verdicts = []
     for limit in limits:
-        wanted = str(limit.metric or limit.signal)
-        label, _, rest = wanted.partition(".")
-        chosen = {label: rest} if label in runs else dict.fromkeys(runs, wanted)
-        for run, name in chosen.items():
+        for run, name in asked_of(str(limit.metric or limit.signal), runs).items():
             if limit.signal is None:
                 verdict = _of_figure(limit, run, name, runs[run])
             else:

@@ -14,12 +14,13 @@ from cosim.errors import InputError
 from cosim.recorder import require_parquet
 from cosim.scenario.schema import Scenario
 
+RESOLVED: Final = "scenario.resolved.yaml"
 RESULT_FILES: Final = (
     "signals.csv",
     "signals.parquet",
     black_box.NAME,
     "metrics.json",
-    "scenario.resolved.yaml",
+    RESOLVED,
     "versions.json",
     "report.html",
 )
@@ -37,9 +38,7 @@ def prepare(output_dir: Path, scenario: Scenario) -> None:
                 path.unlink()
             if left and folder != output_dir and not any(folder.iterdir()):
                 folder.rmdir()
-        (output_dir / "scenario.resolved.yaml").write_text(
-            resolved_yaml(scenario), encoding="utf-8"
-        )
+        (output_dir / RESOLVED).write_text(resolved_yaml(scenario), encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write to '{output_dir}': {error.strerror or error}") from None
 

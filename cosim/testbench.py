@@ -68,3 +68,7 @@ class Testbench(Protocol):
 
     def stop(self) -> None:
         """Let go of the bench, whatever happened before; may be called twice."""
+
+
+# It is not for pytest to collect where a test imports it.
+Testbench.__test__ = False  # type: ignore[attr-defined]

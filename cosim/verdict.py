@@ -33,7 +33,7 @@ class Verdict:
         low = f"at least {self._shown(self.min)}" if self.min is not None else ""
         high = f"at most {self._shown(self.max)}" if self.max is not None else ""
         on = f" (surface {self.surface})" if self.surface is not None else ""
-        return " and ".join(words for words in (low, high) if words) + on
+        return (" and ".join(words for words in (low, high) if words) or "to be available") + on
 
     @property
     def measured(self) -> str:

@@ -40,6 +40,11 @@ def leave(code: int, journal: Journal) -> None:
     os._exit(code)
 
 
+def exit_in_c(code: int, journal: Journal) -> None:
+    journal.call("the exit")
+    ctypes.CDLL(None).exit(code)
+
+
 def killed(job: object, journal: Journal) -> None:
     journal.call("the end")
     os.kill(os.getpid(), signal.SIGKILL)

@@ -214,6 +214,7 @@ def test_a_folder_stands_for_the_scenarios_below_it(tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text("a: 1\n")
     (tmp_path / "torn.yaml").write_text("a: [\n")
     (tmp_path / "notes.txt").write_text("road: x\n")
+    (inner / "scenario.resolved.yaml").write_text("road: x\n")  # among the results of a run
     found, others = find_scenarios([tmp_path, first])
     assert found == [second, tmp_path / "torn.yaml", first]
     assert others == [tmp_path / "other.yaml"]

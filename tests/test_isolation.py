@@ -16,7 +16,7 @@ import isolated_work as work
 import pytest
 
 from cosim.errors import CosimError
-from cosim.isolation import Children, Death, Watch, WorkError
+from cosim.isolation import Children, Death, Journal, Watch, WorkError
 from cosim.isolation.death import death_of, last_line
 
 NEEDS_FORK = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
@@ -66,9 +66,12 @@ def test_a_crash_is_told_with_signal_call_words_and_place(forks: bool) -> None:
         assert answer["twice"] == 4.0
 
 
+@pytest.mark.parametrize("how", [work.leave, work.exit_in_c])
 @pytest.mark.parametrize("code", [0, 3])
-def test_whoever_ends_the_process_brings_no_answer(children: Children, code: int) -> None:
-    death = children.run(work.leave, code)
+def test_whoever_ends_the_process_brings_no_answer(
+    children: Children, how: Callable[[int, Journal], None], code: int
+) -> None:
+    death = children.run(how, code)
     assert isinstance(death, Death)
     assert (death.kind, death.signal, death.call) == ("process-ended", "", "the exit")
     assert death.manner == "ended the whole process"

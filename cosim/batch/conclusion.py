@@ -10,6 +10,7 @@ from cosim import black_box
 from cosim.batch.job import Ended, Job, RunEnd
 from cosim.provenance import add_files
 from cosim.recorder import Recorder
+from cosim.regression.goldens import accept, golden_verdicts
 from cosim.results import folder_of, write_json
 from cosim.run import RunOutcome, conclude
 from cosim.scenario.schema import Scenario
@@ -29,11 +30,13 @@ def judged(
         add_files(versions, run.files, run.label)
     write_json(job.output_dir / "versions.json", versions)
     outcomes = [RunOutcome(r.label, records[r.label], dict(r.figures or {})) for r in ended]
-    outcome = conclude(scenario, job.output_dir, outcomes, versions)
+    moved = () if job.goldens != "accept" else tuple(accept(scenario, records))
+    judge = None if job.goldens == "ignore" else golden_verdicts
+    outcome = conclude(scenario, job.output_dir, outcomes, versions, judge)
     for run in ended:
         _box(scenario, job, run.label).unlink()
     code = max(outcome.exit_code, *(run.exit_code for run in runs))
-    return Ended(job, code, problems, outcome.metrics, outcome.notes, tuple(runs))
+    return Ended(job, code, problems, outcome.metrics, outcome.notes, tuple(runs), moved)
 
 
 def _box(scenario: Scenario, job: Job, label: str) -> Path:

@@ -42,14 +42,21 @@ class Pool:
 
     def __init__(self, processes: int) -> None:
         self._stack = ExitStack()
-        self._children = [Children(MODULES) for _ in range(processes)]
+        self._children = [self._stack.enter_context(Children(MODULES)) for _ in range(processes)]
+
+    @property
+    def processes(self) -> int:
+        """How many there are at most."""
+        return len(self._children)
 
     def __enter__(self) -> Pool:
-        for children in self._children:
-            self._stack.enter_context(children)
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the processes."""
         self._stack.close()
 
     def through(

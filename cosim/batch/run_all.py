@@ -8,7 +8,9 @@ that takes its process with it or does not come back.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from cosim import black_box
@@ -30,24 +32,35 @@ def run_all(
     timeout: float = HANGS_S,
     forgiven: Sequence[int] = (),
 ) -> tuple[list[Ended], bool]:
+    """Like `run_in`, with so many processes of its own."""
+    with Pool(processes) as pool:
+        return run_in(pool, jobs, tell, timeout, forgiven)
+
+
+def run_in(
+    pool: Pool,
+    jobs: Sequence[Job],
+    tell: Tell = lambda ended: None,
+    timeout: float = HANGS_S,
+    forgiven: Sequence[int] = (),
+) -> tuple[list[Ended], bool]:
     """Check all jobs, then run them; return them in their order, and whether they were run.
 
     Where a check finds something, nothing is run and the jobs come back with their problems, unless
     its exit code is one of those `forgiven`: then that job alone is not run. `tell` hears of each
     job as it ends, `timeout` is how long a run may stand still [s].
     """
-    with Pool(processes) as pool:
-        checked = pool.through(Task(worker.check, _unfit), jobs)
-        if any(one.exit_code not in (0, *forgiven) for one in checked.values()):
-            return [_ended(checked[job]) for job in jobs], False
-        sound = [one for one in checked.values() if not one.problems]
-        ready = pool.through(Task(worker.prepare, _unfit), [one.job for one in sound])
-        left = {job: one for job, one in {**checked, **ready}.items() if one.problems}
-        ended = {job: _ended(one) for job, one in left.items()}
-        for one in ended.values():
-            tell(one)
-        batch = _Batch([one for one in sound if one.job not in left], timeout)
-        ended |= batch.run(pool, tell, processes)
+    checked = pool.through(Task(worker.check, _unfit), jobs)
+    if any(one.exit_code not in (0, *forgiven) for one in checked.values()):
+        return [_ended(checked[job]) for job in jobs], False
+    sound = [one for one in checked.values() if not one.problems]
+    ready = pool.through(Task(worker.prepare, _unfit), [one.job for one in sound])
+    left = {job: one for job, one in {**checked, **ready}.items() if one.problems}
+    ended = {job: _ended(one) for job, one in left.items()}
+    for one in ended.values():
+        tell(one)
+    batch = _Batch([one for one in sound if one.job not in left], timeout)
+    ended |= batch.run(pool, tell)
     return [ended[job] for job in jobs], True
 
 
@@ -61,7 +74,7 @@ class _Batch:
         self._drive = Task(worker.drive, buried, timeout, _rows)
         self._conclude = Task(worker.conclude, _unconcluded)
 
-    def run(self, pool: Pool, tell: Tell, processes: int) -> dict[Job, Ended]:
+    def run(self, pool: Pool, tell: Tell) -> dict[Job, Ended]:
         """Run them all, the longest first: what is begun last should not be what all wait for;
         those that go by the clock one after another when nothing else goes on.
         """
@@ -71,7 +84,7 @@ class _Batch:
                 tell(one)
 
         ended: list[Ended | None] = []
-        for alone, at_once in ((False, processes), (True, 1)):
+        for alone, at_once in ((False, pool.processes), (True, 1)):
             chosen = [one for one in self._scenarios if one.alone == alone]
             runs = [Run(one, i) for one in chosen for i in range(len(one.labels))]
             runs.sort(key=lambda run: -run.checked.longest_s)
@@ -80,7 +93,9 @@ class _Batch:
 
     def _one(self, children: Children, run: Run) -> Ended | None:
         """Do one run; return the end of its scenario if it was the last of it."""
-        end, checked = self._drive.done(children, run), run.checked
+        begin, checked = time.monotonic(), run.checked
+        end = self._drive.done(children, run)
+        end = replace(end, wall_s=time.monotonic() - begin)
         with self._lock:
             ends = self._ends[checked.job]
             ends[run.label] = end

@@ -4,7 +4,6 @@ controllers, and judge what has come of them. Nothing heavy is imported before.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -67,7 +66,6 @@ def prepare(job: Job, journal: Journal) -> Checked:
 
 def drive(run: Run, journal: Journal) -> RunEnd:
     """Run one controller of a scenario and write its signals; its rows outlive this process."""
-    begin = time.monotonic()
 
     def go() -> RunEnd:
         from cosim import black_box
@@ -85,14 +83,13 @@ def drive(run: Run, journal: Journal) -> RunEnd:
         outcome = drive_assembly(scenario, controller, assembly, run.folder)
         journal.call("the end of the run")
         last_s = float(recorder.time[-1]) if recorder.rows else None
-        wall = time.monotonic() - begin
-        return RunEnd(run.label, outcome.figures, assembly.files, wall_s=wall, last_s=last_s)
+        return RunEnd(run.label, outcome.figures, assembly.files, last_s=last_s)
 
     journal.call("the assembly of the run")
-    return guarded(go, lambda code, problems: _failed(run, code, problems, begin))
+    return guarded(go, partial(_failed, run))
 
 
-def _failed(run: Run, code: int, problems: tuple[str, ...], begin: float) -> RunEnd:
+def _failed(run: Run, code: int, problems: tuple[str, ...]) -> RunEnd:
     """Return the end of a run that failed with words; what it has recorded is written already."""
     from cosim import black_box
     from cosim.recorder import Recorder
@@ -104,8 +101,7 @@ def _failed(run: Run, code: int, problems: tuple[str, ...], begin: float) -> Run
         box.unlink()
     several = len(run.checked.labels) > 1
     said = tuple(f"{run.label}: {words}" if several else words for words in problems)
-    wall = time.monotonic() - begin
-    return RunEnd(run.label, exit_code=code, problems=said, wall_s=wall, last_s=last_s)
+    return RunEnd(run.label, exit_code=code, problems=said, last_s=last_s)
 
 
 def conclude(conclusion: Conclusion, journal: Journal) -> Ended:

@@ -7,6 +7,7 @@ FMU in it; elsewhere the process does one work itself and ends with it.
 
 from __future__ import annotations
 
+import ctypes
 import faulthandler
 import os
 import pickle
@@ -55,6 +56,7 @@ def _until_it_ends(child: int) -> None:
 def perform(folder: Path) -> None:
     """Do one work, leave its answer and end the process; a crash leaves none."""
     _away_from_the_terminal(folder)
+    _without_farewell()
     answer: object
     try:
         work, job = pickle.loads((folder / WORK).read_bytes())
@@ -65,6 +67,16 @@ def perform(folder: Path) -> None:
     sys.stderr.flush()
     (folder / ANSWER).write_bytes(pickle.dumps(answer))
     os._exit(0)  # the clean-up of an FMU's library at exit is nobody's concern
+
+
+def _without_farewell() -> None:
+    """Let `exit`, which an FMU may call, end the process at once: the farewell of a library waits
+    for threads that a fork does not have.
+    """
+    if sys.platform == "linux":
+        system = ctypes.CDLL(None)
+        if hasattr(system, "on_exit"):  # of the GNU C library
+            system.on_exit(system._exit, None)
 
 
 def _away_from_the_terminal(folder: Path) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from cosim.errors import Problem
-from cosim.limits import check_signal
+from cosim.limits import asked_of, check_signal
 from cosim.record import record_groups, record_groups_of
 from cosim.recorder import TIME
 from cosim.scenario.schema import Scenario
@@ -33,7 +33,10 @@ def raw_signal_problems(
 
 
 def signal_problems(scenario: Scenario) -> Iterator[Problem]:
-    """Yield signals that a run which they are asked of does not record, in a valid scenario."""
+    """Yield signals that a run which they are asked of does not record, and goldens that a run has
+    two of, in a valid scenario.
+    """
+    yield from _doubled_goldens(scenario)
     recorded = {}
     for controller in scenario.controllers:
         groups = record_groups_of(scenario, controller)
@@ -42,14 +45,25 @@ def signal_problems(scenario: Scenario) -> Iterator[Problem]:
         for index, entry in enumerate(getattr(scenario, section)):
             if entry.signal is None:
                 continue
-            label, _, rest = entry.signal.partition(".")
-            asked = {label: rest} if label in recorded else dict.fromkeys(recorded, entry.signal)
+            asked = asked_of(entry.signal, recorded)
             without = [run for run, name in asked.items() if name not in recorded[run]]
             if without:
                 sentence = f"'{asked[without[0]]}' is not recorded in run {', '.join(without)}"
                 yield scenario.problem(
                     (section, index, "signal"), f"{sentence}: {_when(asked[without[0]])}"
                 )
+
+
+def _doubled_goldens(scenario: Scenario) -> Iterator[Problem]:
+    """Yield goldens of a signal that the same run has one of already."""
+    seen: set[tuple[str, str]] = set()
+    labels = [controller.label for controller in scenario.controllers]
+    for index, golden in enumerate(scenario.goldens):
+        asked = set(asked_of(golden.signal, labels).items())
+        for run, name in sorted(asked & seen)[:1]:
+            sentence = f"run {run} has a golden of '{name}' already"
+            yield scenario.problem(("goldens", index, "signal"), sentence)
+        seen |= asked
 
 
 def _when(name: str) -> str:
