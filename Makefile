@@ -12,7 +12,7 @@ SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/* fmu/sensor/*)
 
-.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness faults manoeuvres roads benchmarks benchmark-network embedded sanitize clean study retrain-check
+.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness faults can manoeuvres roads benchmarks benchmark-network embedded sanitize clean study retrain-check
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -106,6 +106,9 @@ robustness: $(VENV)/test.stamp ## an hour, faulty channels, spinning wheels, slo
 
 faults: $(VENV)/test.stamp ## what faults and latencies do to estimate and ride: docs/faults.md (some minutes)
 	$(ONE_THREAD) $(BIN)/python docs/measure/fault_scenarios.py
+
+can: $(VENV)/test.stamp ## the sensor on a CAN bus, its frames and what they cost: docs/can.md (some minutes)
+	$(ONE_THREAD) $(BIN)/python docs/measure/can_bus.py
 
 manoeuvres: $(VENV)/test.stamp ## how the paper's manoeuvres were driven: docs/paper-scenarios.md (about a minute)
 	$(ONE_THREAD) $(BIN)/python docs/measure/manoeuvres.py

@@ -1,8 +1,8 @@
 """The command line; heavy packages are imported where they are used, so that `--help` is quick.
 
 Results for programs go to stdout (`--json`), words for people to stderr. Exit codes: 0 fine, 1 a
-limit failed, 2 wrong usage or bad input, 3 an FMU or a network failed, 130 interrupted; of several
-scenarios the highest.
+limit failed, 2 wrong usage or bad input, 3 an FMU, a network or a bus failed, 130 interrupted; of
+several scenarios the highest.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -99,6 +99,8 @@ def outcome(shown: Outcome) -> None:
             f" {factor:.1f} times real time",
             err=True,
         )
+        if figures["bus"]:
+            click.echo(f"{one.label}: {bus_words(figures['bus'])}", err=True)
     if len(shown.runs) == 1:
         table(estimate_table(shown.runs[0].figures, paper, shown.metrics["sensor"]))
     else:
@@ -120,6 +122,17 @@ def outcome(shown: Outcome) -> None:
     none = "no limits that count here" if shown.scenario.limits else "no limits set"
     summary = verdict if count else none
     click.echo(f"{summary}; results in {shown.output_dir}", err=True)
+
+
+def bus_words(figures: Mapping[str, float]) -> str:
+    """Return what was measured on the bus, in words."""
+    words = [f"{figures['answers_in_time']} of {figures['samples']} answers in time"]
+    if "latency_p50_ms" in figures:
+        p50, p99, largest = (figures[f"latency_{part}_ms"] for part in ("p50", "p99", "max"))
+        words.append(f"latency median {p50:.2f} ms, 99 % {p99:.2f} ms, at most {largest:.2f} ms")
+    lost = figures.get("frames_lost")
+    words.append("lost frames not told" if lost is None else f"{lost} frames lost")
+    return "; ".join(words)
 
 
 def batch(ended: Sequence[Ended]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,10 +22,12 @@ from cosim.bus.codec import (
     to_sensor,
 )
 from cosim.bus.dbc import DBC, dbc_text
+from cosim.bus.frame_table import bus_load_percent, frame_table
 from cosim.bus.messages import CONTROL, FRAMES, STATUS, TO_SENSOR, UNITS, bus_name
 from sensor.channels import CHANNELS, COMMANDS, OUTPUTS, STAGED
 from sensor.conditions import PRODUCTION, Measurement
 
+ROOT = Path(__file__).parents[1]
 GRAVITY, DEGREE, KMH = 9.81, math.pi / 180.0, 1.0 / 3.6
 
 
@@ -39,6 +42,18 @@ def test_every_channel_is_on_the_bus_once_in_a_unit_of_its_quantity():
         assert len(found) == 1, channel.name
         assert UNITS[found[0].unit or ""][0] == channel.unit
     assert len(signals) == len(CHANNELS) + len(COMMANDS) + len(TO_SENSOR)  # a counter in each
+
+
+def test_the_page_has_the_table_of_the_dbc():
+    assert frame_table() in (ROOT / "docs" / "can.md").read_text(encoding="utf-8")
+    assert all(f"**{frame.name}**" in frame_table() for frame in FRAMES)
+
+
+def test_the_largest_load_is_that_of_135_bits_for_a_frame_of_8_bytes():
+    frames = [m for m in database().messages if m.cycle_time == 10]
+    assert sorted(m.length for m in frames) == [5, 7, 7, 8, 8, 8, 8, 8, 8, 8]
+    bits = 7 * 135 + 2 * (47 + 56 + 22) + (47 + 40 + 18)  # by hand: 89 // 4 and 73 // 4 stuff bits
+    assert bus_load_percent() == pytest.approx(100.0 * bits / 5000.0)
 
 
 def test_the_frames_are_classic_can():

@@ -107,6 +107,8 @@ def test_a_node_on_the_command_line_is_stopped_by_a_signal_and_tells_what_it_did
         path = write_scenario(tmp_path, sections={"sensor": section})
         result = CliRunner().invoke(main, ["run", str(path), "--output-dir", str(tmp_path / "out")])
         assert result.exit_code == 0, result.stderr
+        assert "101 of 101 answers in time; latency median" in result.stderr
+        assert "0 frames lost" in result.stderr
         process.send_signal(signal.SIGTERM)
         out, words = process.communicate(timeout=60)
     finally:

@@ -48,6 +48,10 @@ def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
     parrot(bench / "p.fmu")
     write_scenario(bench, name="crash", sections={"limits": HOLDS, "vehicle": CRASHES})
     write_scenario(bench, name="without")
+    hangs = "{fmu: p.fmu, parameters: {Parrot.HangAt: 3}}"
+    write_scenario(bench, name="hang", sections={"limits": HOLDS, "vehicle": hangs})
+    goldens = "[{signal: Car.az, tolerance: 0.1}]"
+    write_scenario(bench, name="golden", duration="0.2", sections={"goldens": goldens})
     wrong = {"limits": "[{signal: Car.azz, max: 1}]"}
     write_scenario(bench, name="wrong", sections=wrong)
     (bench / "other.yaml").write_text("a: 1\n")
@@ -57,7 +61,7 @@ def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def asked(suite: Path) -> subprocess.CompletedProcess[str]:
-    return run_pytest(suite, "--cosim", "-v", "--junitxml=out.xml")
+    return run_pytest(suite, "--cosim", "-v", "--cosim-timeout=4", "--junitxml=out.xml")
 
 
 def test_it_is_found_under_its_entry_point() -> None:
@@ -86,8 +90,9 @@ def test_unasked_it_collects_nothing_and_loads_nothing_heavy(suite: Path) -> Non
 def test_a_setting_turns_it_on(suite: Path) -> None:
     found = run_pytest(suite, "-o", "cosim=true", "--collect-only", "-q").stdout
     assert [line for line in found.splitlines() if "::" in line] == [
-        "bench/bad.yaml::scenario", "bench/crash.yaml::scenario", "bench/good.yaml::scenario",
-        "bench/wrong.yaml::scenario", "test_own.py::test_own",
+        "bench/bad.yaml::scenario", "bench/crash.yaml::scenario", "bench/golden.yaml::scenario",
+        "bench/good.yaml::scenario", "bench/hang.yaml::scenario", "bench/wrong.yaml::scenario",
+        "test_own.py::test_own",
     ]  # fmt: skip
 
 
@@ -99,7 +104,8 @@ def test_verdicts(asked: subprocess.CompletedProcess[str]) -> None:
     }
     assert verdicts == {
         "bench/good.yaml": "PASSED", "bench/bad.yaml": "FAILED", "bench/crash.yaml": "FAILED",
-        "bench/wrong.yaml": "FAILED", "test_own.py": "PASSED",
+        "bench/wrong.yaml": "FAILED", "bench/hang.yaml": "FAILED", "bench/golden.yaml": "FAILED",
+        "test_own.py": "PASSED",
     }  # fmt: skip
 
 
@@ -110,6 +116,8 @@ def test_failures_are_said_without_the_way_to_them(
     assert "bad.yaml: FAILED: passive: largest_deviation_m is " in said
     assert "crash.yaml: the run crashed (SIGABRT, it gave up)" in said
     assert "after the sample at t = 0.06 s" in said
+    assert "hang.yaml: the run did not go on for 4 s" in said
+    assert "golden.yaml: FAILED: passive: file of goldens is not available (there is none" in said
     assert "'Car.azz' is not a recorded signal; did you mean 'Car.az'?" in said
     assert "Traceback" not in said
     assert "pytest_plugin.py" not in said
@@ -125,30 +133,12 @@ def test_figures_are_properties(asked: subprocess.CompletedProcess[str], suite: 
     assert "fixed.largest_deviation_m" in found
 
 
-def test_a_file_that_is_named_is_run_whatever_is_in_it(suite: Path) -> None:
-    result = run_pytest(
-        suite, "--cosim", "-q", "bench/without.yaml", "--cosim-output-dir=elsewhere"
-    )
-    assert result.returncode == 0, result.stdout
+def test_what_is_named_is_run_whatever_is_in_it_and_goldens_are_accepted(suite: Path) -> None:
+    files = [f"bench/{name}.yaml" for name in ("without", "torn", "golden")]
+    options = ("-q", "-rA", "--cosim-output-dir=elsewhere", "--cosim-accept")
+    result = run_pytest(suite, "--cosim", *files, *options)
+    assert "1 failed, 2 passed" in result.stdout
+    assert "torn.yaml:" in result.stdout
+    assert "Car.az is new" in result.stdout
     assert (suite / "elsewhere" / "bench" / "without" / "metrics.json").exists()
-    torn = run_pytest(suite, "--cosim", "-q", "bench/torn.yaml")
-    assert torn.returncode == 1
-    assert "torn.yaml:" in torn.stdout
-
-
-def test_goldens_and_hangs(suite: Path) -> None:
-    goldens = "[{signal: Car.az, tolerance: 0.1}]"
-    path = write_scenario(suite, name="g", duration="0.2", sections={"goldens": goldens})
-    missing = run_pytest(suite, "--cosim", "-q", "g.yaml")
-    assert missing.returncode == 1
-    assert "there is none yet" in missing.stdout
-    accepted = run_pytest(suite, "--cosim", "-q", "-rA", "g.yaml", "--cosim-accept")
-    assert accepted.returncode == 0
-    assert "Car.az is new" in accepted.stdout
-    assert run_pytest(suite, "--cosim", "-q", "g.yaml").returncode == 0
-    path.unlink()
-    vehicle = "{fmu: bench/p.fmu, parameters: {Parrot.HangAt: 3}}"
-    write_scenario(suite, name="h", sections={"vehicle": vehicle})
-    hangs = run_pytest(suite, "--cosim", "-q", "h.yaml", "--cosim-timeout=5")
-    assert hangs.returncode == 1
-    assert "did not go on for 5 s" in hangs.stdout
+    assert (suite / "bench" / "golden" / "golden" / "passive.csv").exists()

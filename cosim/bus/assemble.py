@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,15 @@ if TYPE_CHECKING:
 
 
 def address_of(bus: Bus) -> Address:
-    """Return the bus of a scenario."""
-    return Address(bus.interface, bus.channel, bus.options)
+    """Return the bus of a scenario; a run that starts its own sensor over UDP takes a port that
+    nobody uses where none is given, so that runs at the same time do not meet.
+    """
+    options = dict(bus.options)
+    if bus.start_node and bus.interface == "udp_multicast" and "port" not in options:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("", 0))
+            options["port"] = probe.getsockname()[1]
+    return Address(bus.interface, bus.channel, options)
 
 
 def bus_sensor(sensor: Sensor, file: Path | None) -> BusSensor:
@@ -28,19 +36,18 @@ def bus_sensor(sensor: Sensor, file: Path | None) -> BusSensor:
 
     bus = sensor.bus
     assert bus is not None
-    process = NodeProcess(node_arguments(sensor, file)) if bus.start_node else None
+    address = address_of(bus)
+    process = NodeProcess(node_arguments(sensor, file, address)) if bus.start_node else None
     waiting = Waiting(1e-3 * bus.deadline_ms, bus.oldest_samples, bus.connect_s)
-    return BusSensor(address_of(bus), waiting, fingerprint(sensor.estimator, file), process)
+    return BusSensor(address, waiting, fingerprint(sensor.estimator, file), process)
 
 
-def node_arguments(sensor: Sensor, file: Path | None) -> list[str]:
+def node_arguments(sensor: Sensor, file: Path | None, address: Address) -> list[str]:
     """Return the arguments of `cosim sensor-node` for a scenario's sensor."""
-    bus = sensor.bus
-    assert bus is not None
-    arguments = ["--interface", bus.interface]
-    if bus.channel is not None:
-        arguments += ["--channel", str(bus.channel)]
-    for name, value in bus.options.items():
+    arguments = ["--interface", address.interface]
+    if address.channel is not None:
+        arguments += ["--channel", str(address.channel)]
+    for name, value in address.options.items():
         arguments += ["--option", f"{name}={value}"]
     for kind in ("network", "fmu"):
         if getattr(sensor, kind) is not None:

@@ -13,7 +13,7 @@ from cosim.bus.answers import Answer, Answers
 from cosim.bus.codec import to_sensor
 from cosim.bus.messages import COUNTER
 from cosim.bus.samples import MODULO
-from cosim.bus.session import MOST_FRAMES, Session
+from cosim.bus.session import MOST_FRAMES, REPEAT_S, Session
 from cosim.bus.transport import Address, Link
 from cosim.errors import BusError
 from sensor.channels import CHANNELS, OUTPUTS
@@ -27,6 +27,7 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 SILENCE_S: Final = 2.0
 """Time waited in vain after which the bench waits no more until the sensor is heard again."""
+GOODBYE_S: Final = 5.0  # for a sensor that was heard, and may still have a queue to work off
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,8 @@ class BusSensor:
         link, session = self._open
         try:
             if self._samples:
-                self._lost_to_sensor = session.end()
+                patient = self._in_vain_s < SILENCE_S
+                self._lost_to_sensor = session.end(GOODBYE_S if patient else REPEAT_S)
         finally:
             self._open = None
             link.close()

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 REPEAT_S: Final = 0.1  # between two calls for the sensor
 SECOND_ANSWER_S: Final = 0.05  # time for a second sensor to betray itself
-GOODBYE_S: Final = 1.0
 MOST_FRAMES: Final = 1000  # read at once, whatever else is on the bus
 
 Other = Callable[["can.Message"], None]
@@ -59,11 +58,16 @@ class Session:
             raise BusError(f"more than one sensor answers on bus {self._link.address}")
         return status["Fingerprint"]
 
-    def end(self) -> int | None:
-        """Tell the end of the run; return how many frames the sensor has lost if it says so."""
-        self._call(END)
-        status = self._status(GOODBYE_S)
-        return None if status is None else status["FramesLost"]
+    def end(self, patience_s: float) -> int | None:
+        """Tell the end of the run, until the sensor has worked off what it was sent; return how
+        many frames it has lost if it says so.
+        """
+        end = time.perf_counter() + patience_s
+        while time.perf_counter() < end:
+            self._call(END)
+            if (status := self._status(REPEAT_S)) is not None:
+                return status["FramesLost"]
+        return None
 
     def check_alone(self, message: can.Message) -> None:
         """Raise `BusError` for a frame of another bench."""
