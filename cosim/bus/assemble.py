@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from cosim.bus.transport import Address, interface_problem, missing_packages
 from cosim.errors import Problem
@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from cosim.scenario.bus import Bus
     from cosim.scenario.schema import Scenario
     from cosim.scenario.sensor import Sensor
+
+PATIENCE: Final = 0.5
+"""Share of the deadline for which a run's own node waits for the frames of a sample: long enough to
+wait for all of them, short enough to answer without one.
+"""
 
 
 def address_of(bus: Bus) -> Address:
@@ -37,7 +42,10 @@ def bus_sensor(sensor: Sensor, file: Path | None) -> BusSensor:
     bus = sensor.bus
     assert bus is not None
     address = address_of(bus)
-    process = NodeProcess(node_arguments(sensor, file, address)) if bus.start_node else None
+    process = None
+    if bus.start_node:
+        patience = ["--patience", f"{PATIENCE * bus.deadline_ms:g}"] if bus.deadline_ms else []
+        process = NodeProcess([*node_arguments(sensor, file, address), *patience])
     waiting = Waiting(1e-3 * bus.deadline_ms, bus.oldest_samples, bus.connect_s)
     return BusSensor(address, waiting, fingerprint(sensor.estimator, file), process)
 

@@ -180,7 +180,7 @@ STATUS: Final = Frame(
     "answer to BenchControl",
     (
         SESSION,
-        BusSignal("FramesLost", "frames of this run that did not reach the sensor", 16),
+        BusSignal("FramesLost", "frames of this run that the sensor did not have in time", 16),
         BusSignal("Fingerprint", "CRC-32 of the estimator's file or name, 0 if not told", 32),
     ),
     cyclic=False,

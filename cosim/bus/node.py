@@ -27,7 +27,7 @@ LARGEST_COUNT: Final = 0xFFFF
 
 @dataclass
 class Counts:
-    """What a node has done; durations in ms."""
+    """What a node has done; durations in ms. `frames_late` of `frames_lost` came after all."""
 
     runs: int = 0
     samples: int = 0
@@ -116,17 +116,13 @@ class SensorNode:
             self._ended = True
             self.counts.runs += 1
         if session == self._session:
-            lost = min(self._lost, LARGEST_COUNT)
+            lost = min(self._samples.frames_lost, LARGEST_COUNT)
             status = {"Session": session, "FramesLost": lost, "Fingerprint": self._fingerprint}
             self._link.send(encode_one(STATUS, **status))
 
-    @property
-    def _lost(self) -> int:
-        return max(self._samples.frames_lost - self._samples.frames_late, 0)
-
     def _collect(self) -> None:
         """Add what the present run has lost."""
-        self.counts.frames_lost += self._lost
+        self.counts.frames_lost += self._samples.frames_lost
         self.counts.frames_late += self._samples.frames_late
         self._samples.frames_lost = self._samples.frames_late = 0
 

@@ -39,7 +39,7 @@ class Samples:
     `patience_s` after its first frame.
 
     `frames_lost` counts frames that were not there when their sample was due, `frames_late` those
-    of them that came after all.
+    of them that came after all: too late is lost.
     """
 
     def __init__(self, patience_s: float) -> None:

@@ -39,7 +39,7 @@ ROADS = {
     "class C at 50 km/h": "road/class_c_50.yaml",
     "class B at 80 km/h": "road/class_b_80.yaml",
     "cobbles at 30 km/h": "road/cobbles_30.yaml",
-    "Hockenheim, class A": "paper/hockenheim_normal.yaml",
+    "Hockenheim on class A": "paper/hockenheim_normal.yaml",
 }
 ESTIMATORS = ("carried", "bilstm_w19", "bilstm_residual_w19", "kalman", "fir_residual_w64")
 DURATION_S = 30.0
