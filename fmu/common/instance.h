@@ -58,8 +58,8 @@ void instance_free(Instance *instance);
 void strip_separator(char *path);
 
 /* A sentence for the logger; they return MODEL_ERROR and MODEL_WARNING so that callers can `return refuse(...)`. */
-ModelStatus refuse(const Instance *instance, const char *format, ...) __attribute__((format(printf, 2, 3)));
-ModelStatus warn(const Instance *instance, const char *format, ...) __attribute__((format(printf, 2, 3)));
+ModelStatus refuse(const Instance *instance, const char *format, ...) LIKE_PRINTF(2, 3);
+ModelStatus warn(const Instance *instance, const char *format, ...) LIKE_PRINTF(2, 3);
 
 ModelStatus check_identity(const Instance *instance, const char *name, const char *token);
 ModelStatus check_phase(const Instance *instance, const char *function, int allowed);

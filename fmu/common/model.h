@@ -10,6 +10,13 @@
 #include <stddef.h>
 #include "variables.h" /* generated: typedef struct {...} Variables; counts; start values */
 
+/* Lets a compiler that can compare the values of a call with its format. */
+#if defined(__GNUC__)
+#define LIKE_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
+#define LIKE_PRINTF(text, first)
+#endif
+
 typedef enum { MODEL_OK, MODEL_WARNING, MODEL_ERROR = 3 } ModelStatus; /* the numbers of both FMI versions */
 
 typedef struct Model {
@@ -40,6 +47,6 @@ void model_release(Model *m);
 
 /* Provided by the FMI layer: `category` is one of the categories declared in variables.toml. printf format. */
 void model_log(const Model *m, ModelStatus status, const char *category, const char *format, ...)
-    __attribute__((format(printf, 4, 5)));
+    LIKE_PRINTF(4, 5);
 
 #endif
