@@ -12,7 +12,7 @@ SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/* fmu/sensor/*)
 
-.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper evaluation robustness faults can manoeuvres roads benchmarks benchmark-network embedded sanitize clean study retrain-check
+.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper bounds evaluation robustness closed-loop faults can manoeuvres roads benchmarks benchmark-network embedded sanitize clean study retrain-check
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -103,6 +103,9 @@ robustness: $(VENV)/test.stamp ## an hour, faulty channels, spinning wheels, slo
 	$(BIN)/cosim sensor dataset scenarios/datasets/hour.yaml --out $(HOUR_DATA)
 	$(BIN)/python -m pip install --quiet -e '.[docs]'
 	$(ONE_THREAD) $(BIN)/python docs/measure/robustness.py --data $(EVALUATION_DATA) --hour-data $(HOUR_DATA)
+
+closed-loop: $(VENV)/test.stamp ## skyhook on truth and estimates, against the goals: docs/closed-loop.md (some minutes)
+	$(ONE_THREAD) $(BIN)/python docs/measure/closed_loop.py
 
 faults: $(VENV)/test.stamp ## what faults and latencies do to estimate and ride: docs/faults.md (some minutes)
 	$(ONE_THREAD) $(BIN)/python docs/measure/fault_scenarios.py
