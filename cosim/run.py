@@ -132,6 +132,12 @@ class Outcome:
         """0 when every limit holds, else 1."""
         return 0 if self.passed else 1
 
+    def sensor_of(self, label: str) -> dict[str, Any]:
+        """Return the settings of the sensor in one run: the scenario's, or its controller's own."""
+        controller = next(one for one in self.scenario.controllers if one.label == label)
+        settings = controller.sensor_of_run(self.scenario.sensor)
+        return settings.model_dump(mode="json", exclude_none=True)
+
 
 def execute(
     scenario: Scenario,

@@ -102,7 +102,8 @@ def outcome(shown: Outcome) -> None:
         if figures["bus"]:
             click.echo(f"{one.label}: {bus_words(figures['bus'])}", err=True)
     if len(shown.runs) == 1:
-        table(estimate_table(shown.runs[0].figures, paper, shown.metrics["sensor"]))
+        only = shown.runs[0]
+        table(estimate_table(only.figures, paper, shown.sensor_of(only.label)))
     else:
         table(comparison_table({one.label: one.figures for one in shown.runs}))
     for one in shown.runs:

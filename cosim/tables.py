@@ -124,8 +124,8 @@ def estimate_table(
     return Table(title, columns, tuple(rows), " ".join(notes))
 
 
-def _sensor_note(sensor: Mapping[str, str]) -> str:
-    name = sensor.get("estimator") or sensor.get("network")
+def _sensor_note(sensor: Mapping[str, Any]) -> str:
+    name = next(sensor[kind] for kind in ("estimator", "network", "fmu") if sensor.get(kind))
     return f"Sensor: {name}, channels measured in condition {sensor['condition']}."
 
 

@@ -59,6 +59,15 @@ def test_json_on_stdout_is_metrics_json(cosim):
     assert json.loads(result.stdout) == json.loads(Path("out/metrics.json").read_text())
 
 
+def test_the_sensor_that_the_run_had_is_named(cosim):
+    assert "Sensor: carried, channels measured in condition ideal." in cosim("lap.yaml").stderr
+    Path("s.fmu").touch()
+    named = cosim("lap.yaml", "--set", "sensor={fmu: s.fmu}").stderr
+    assert "Sensor: s.fmu, channels measured in condition ideal." in named
+    own = cosim("lap.yaml", "--set", "controllers=[{kind: passive, estimator: fir_w64}]").stderr
+    assert "Sensor: fir_w64, channels measured in condition ideal." in own
+
+
 def test_plain_text_without_a_terminal(cosim):
     assert "\x1b" not in cosim("lap.yaml").stderr
 

@@ -60,9 +60,12 @@ def test_without_a_valid_sample_there_are_no_figures():
     assert "Truth" in plain(estimate_table({"valid_samples": 0}))
 
 
-def test_the_table_names_the_sensor(figures):
-    settings = {"estimator": "fir_w64", "condition": "production"}
-    note = "Sensor: fir_w64, channels measured in condition production."
+@pytest.mark.parametrize(
+    ("kind", "name"), [("estimator", "fir_w64"), ("network", "my.onnx"), ("fmu", "my.fmu")]
+)
+def test_the_table_names_the_sensor(figures, kind, name):
+    note = f"Sensor: {name}, channels measured in condition production."
+    settings = {kind: name, "condition": "production"}
     assert plain(estimate_table(figures, None, settings)).endswith(note)
 
 

@@ -88,7 +88,7 @@ def _comparison(outcome: Outcome) -> Table | None:
 
 
 def _table(outcome: Outcome, run: RunOutcome) -> Table:
-    return estimate_table(run.figures, outcome.metrics["paper"], outcome.metrics["sensor"])
+    return estimate_table(run.figures, outcome.metrics["paper"], outcome.sensor_of(run.label))
 
 
 def _signals(run: RunOutcome, acting: Sequence[Acting]) -> dict[str, Any]:
