@@ -8,11 +8,14 @@ import pytest
 from click.testing import CliRunner, Result
 from loop_rig import write_scenario
 
+from cosim.batch import find_scenarios
 from cosim.cli import main
 from cosim.errors import InputError
-from cosim.regression.golden_file import read_golden
+from cosim.limits import asked_of
+from cosim.regression.golden_file import golden_path, read_golden
 from cosim.scenario.load import load
 
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 GOLDENS = (
     "[{signal: Truth.VRel.FL, tolerance: 0.002, time_tolerance_s: 0.01},"
     " {signal: Car.az, tolerance: 0.005, from_s: 0.2, to_s: 0.4},"
@@ -153,3 +156,23 @@ def test_what_is_wrong_with_goldens_is_said(tmp_path: Path, goldens: str, words:
     with pytest.raises(InputError) as caught:
         load(path)
     assert words in str(caught.value)
+
+
+def test_the_shipped_goldens_are_there_and_small() -> None:
+    files, _ = find_scenarios([SCENARIOS])
+    shipped = [one for one in (load(file) for file in files) if one.goldens]
+    assert len(shipped) >= 10
+    paths = []
+    for scenario in shipped:
+        for golden in scenario.goldens:
+            runs = asked_of(golden.signal, [one.label for one in scenario.controllers])
+            for run, name in runs.items():
+                path = golden_path(Path(str(scenario.file)), run)
+                file = read_golden(path, 0.01)
+                assert file is not None, path
+                assert len(file.courses[name].rows) > 1, (path, name)
+                paths.append(path)
+    assert set(paths) == set(SCENARIOS.glob("*/golden/*/*.csv"))
+    sizes = [path.stat().st_size for path in set(paths)]
+    assert max(sizes) < 100_000
+    assert sum(sizes) < 1_000_000

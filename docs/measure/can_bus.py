@@ -126,7 +126,7 @@ def costs() -> str:
 
 def runs_of(overrides: list[str]) -> Mapping[str, Any]:
     """Run the bus's scenario; return the figures of its runs."""
-    scenario = load(SCENARIOS / "bus" / "skyhook_class_c_50.yaml", overrides)
+    scenario = load(SCENARIOS / "bus" / "bus_class_c_50.yaml", overrides)
     with tempfile.TemporaryDirectory() as folder:
         runs: Mapping[str, Any] = execute(scenario, Path(folder)).metrics["runs"]
     return runs
