@@ -105,6 +105,7 @@ robustness: $(VENV)/test.stamp ## an hour, faulty channels, spinning wheels, slo
 	$(ONE_THREAD) $(BIN)/python docs/measure/robustness.py --data $(EVALUATION_DATA) --hour-data $(HOUR_DATA)
 
 closed-loop: $(VENV)/test.stamp ## skyhook on truth and estimates, against the goals: docs/closed-loop.md (some minutes)
+	$(BIN)/python -m pip install --quiet -e '.[docs]'
 	$(ONE_THREAD) $(BIN)/python docs/measure/closed_loop.py
 
 faults: $(VENV)/test.stamp ## what faults and latencies do to estimate and ride: docs/faults.md (some minutes)

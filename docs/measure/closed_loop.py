@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from markdown_tables import fill, millimetres, percent, table
+from ride_plane import draw_planes
 from wrong_decisions import bounds_table
 
 from cosim.assembly import assemble
@@ -26,6 +27,8 @@ from cosim.show import counter
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "scenarios" / "closed_loop"
 RESULTS = ROOT / "build" / "closed_loop"
+PICTURE = ROOT / "docs" / "closed-loop" / "plane.svg"
+DRAWN = ("class_c_50", "class_b_80", "bumps_25", "hockenheim")
 PROCESSES = 2
 PAIRS = {  # scenario in both conditions: its title
     "class_b_80": "class B, 80 km/h",
@@ -210,6 +213,8 @@ def write(found: Mapping[str, Runs]) -> None:
     for name in OTHERS[1:]:
         values[name] = fallbacks(found[f"closed_loop_{name}"])
     fill(ROOT / "docs" / "closed-loop.md", values)
+    planes = {(PAIRS[p], c): found[name_of(p, c)] for c in CONDITIONS for p in DRAWN}
+    draw_planes(PICTURE, planes)
 
 
 if __name__ == "__main__":
