@@ -67,6 +67,14 @@ class RealTimeCommand(click.Command):
     help="Run up to N scenarios at the same time, as many as there are cores by default.",
 )
 @click.option(
+    "--timeout",
+    metavar="S",
+    default=60.0,
+    show_default=True,
+    type=click.FloatRange(min=0, min_open=True),
+    help="Wall time in s without a new sample after which a run counts as hanging.",
+)
+@click.option(
     "--real-time",
     metavar="[=FACTOR]",
     help="Go by the clock, FACTOR simulated seconds in one of its seconds, 1 by default.",
@@ -78,6 +86,7 @@ def run(
     output_dir: Path | None,
     overrides: tuple[str, ...],
     jobs: int | None,
+    timeout: float,
     real_time: str | None,
 ) -> None:
     """Run each SCENARIO, a YAML file or a folder of them, and write the results.
@@ -93,11 +102,12 @@ def run(
     one_thread()
     with failures_as_exit_codes():
         if len(scenarios) == 1 and not Path(scenarios[0]).is_dir():
-            code = _run_one(scenarios[0], labelled, output_dir, as_json)
+            target = output_dir or Path("results") / Path(scenarios[0]).stem
+            code = _run_one(scenarios[0], labelled, target, as_json, timeout)
         else:
             paths = [Path(name) for name in scenarios]
             results = output_dir or Path("results")
-            code = _run_several(paths, labelled, results, as_json, jobs or cores())
+            code = _run_several(paths, labelled, results, as_json, jobs or cores(), timeout)
     sys.exit(code)
 
 
@@ -294,19 +304,23 @@ def export_ssp(
 
 
 def _run_one(
-    scenario: str, overrides: Sequence[tuple[str, str]], output_dir: Path | None, as_json: bool
+    scenario: str,
+    overrides: Sequence[tuple[str, str]],
+    target: Path,
+    as_json: bool,
+    timeout: float,
 ) -> int:
     from cosim import show
     from cosim.scenario.load import load_labelled
 
     settings = load_labelled(scenario, overrides)
-    target = output_dir or Path("results") / Path(scenario).stem
 
     from cosim.run import execute
+    from cosim.watchdog import Watchdog
 
     command = "cosim " + shlex.join(sys.argv[1:])
-    with show.progress() as progress:
-        outcome = execute(settings, target, progress, command=command)
+    with Watchdog(timeout, target) as watchdog, show.progress() as progress:
+        outcome = execute(settings, target, progress, watchdog.assemble, command)
     show.outcome(outcome)
     if as_json:
         _print_json(outcome.metrics)
@@ -319,6 +333,7 @@ def _run_several(
     results: Path,
     as_json: bool,
     processes: int,
+    timeout: float,
 ) -> int:
     from cosim import show
     from cosim.batch import find_scenarios, plan, run_all
@@ -327,7 +342,7 @@ def _run_several(
     for file in others:
         click.echo(f"note: {file} has no road, so it is no scenario; left out", err=True)
     jobs = plan(files, results, overrides)
-    ended, were_run = run_all(jobs, processes, show.counter(len(jobs)))
+    ended, were_run = run_all(jobs, processes, show.counter(len(jobs)), timeout)
     if were_run:
         show.batch(ended)
     else:

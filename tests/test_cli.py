@@ -204,7 +204,7 @@ def test_a_lap_that_is_not_finished_fails_without_a_limit(tmp_path, monkeypatch)
     stuck = StandIn()
     finish = stuck.run
     stuck.run = lambda progress: replace(finish(progress), lap_time_s=None)
-    monkeypatch.setattr("cosim.run._assemble", lambda: lambda *_: stuck)
+    monkeypatch.setattr("cosim.assembly.assemble", lambda *_: stuck)
     result = CliRunner().invoke(
         main, ["run", str(tmp_path / "a.yaml"), "--output-dir", str(tmp_path / "out")]
     )

@@ -146,7 +146,8 @@ def test_a_crash_or_a_hang_is_told_and_its_rows_are_there(
 
 def test_an_fmu_that_hangs_before_its_start(tested: Outcome) -> None:
     assert "did not go on for 6 s in connect (vehicle.py" in tested.sentence("hangs_at_start") or (
-        "did not go on for 6 s in initialise (fmi.py" in tested.sentence("hangs_at_start")
+        "did not go on for 6 s inside an FMU, in initialise (fmi.py"
+        in tested.sentence("hangs_at_start")
     )
     assert tested.sentence("hangs_at_start").endswith("before its start")
     assert not (tested.folder / "results" / "hangs_at_start" / "signals.csv").exists()
@@ -179,7 +180,29 @@ def test_a_case_for_the_run_and_each_limit(tested: Outcome) -> None:
     assert error.get("type") == "crash"
     assert "SIGABRT" in error.get("message")
     assert "fmi.py" in crashed.findtext("system-err")
+    assert "Extension modules" not in crashed.findtext("system-err")
     assert suites["hangs"].find("testcase/error").get("type") == "hang"
+
+
+@pytest.mark.parametrize(
+    ("path", "package", "name"),
+    [
+        ("bench/v1.2/a.yaml", "bench.v1_2", "bench.v1_2.a"),
+        ("{here}/bench/a.b.yaml", "bench", "bench.a_b"),
+        ("a.yaml", ".", "a"),
+        ("../other/a.yaml", "other", "other.a"),
+        ("/elsewhere/bench/a.yaml", "elsewhere.bench", "elsewhere.bench.a"),
+    ],
+)
+def test_a_build_server_sees_folders_as_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: str, package: str, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    job = Job(Path(path.format(here=tmp_path)), tmp_path)
+    ended = Ended(job, 0, (), {"runs": {"a": {}}, "limits": []}, (), (RunEnd("a", {}),))
+    write_junit(Path("x.xml"), [ended], datetime(2020, 1, 2))
+    (suite,) = etree.parse("x.xml").getroot()
+    assert (suite.get("package"), suite[1].get("classname")) == (package, name)
 
 
 def test_figures_are_properties(tested: Outcome) -> None:

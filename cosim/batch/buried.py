@@ -8,28 +8,41 @@ from cosim import black_box
 from cosim.batch.job import Run, RunEnd
 from cosim.errors import InputError
 from cosim.isolation import Death
-from cosim.recorder import Recorder
+from cosim.recorder import Format, Recorder
 
 
 def buried(run: Run, death: Death) -> RunEnd:
     """Write what a run has recorded until its process died, and return how it ended."""
-    last_s, wrote = None, ""
     box = run.folder / black_box.NAME
+    name = f"the run {run.label}" if len(run.checked.labels) > 1 else "the run"
+    record, unread = None, ""
     try:
         record = Recorder.recovered(box)
         box.unlink()
-        if record.rows:
-            last_s = float(record.time[-1])
-            wrote = f"; {_until(record.rows, record.write(run.folder, run.checked.file_format))}"
     except FileNotFoundError:
         pass
     except (InputError, OSError) as error:
-        wrote = f"; its record cannot be written: {error}"
-    when = f"after the sample at t = {last_s:.6g} s" if last_s is not None else "before its start"
-    where = f" in {death.frame}" if death.frame else ""
-    name = f"the run {run.label}" if len(run.checked.labels) > 1 else "the run"
-    words = f"{name} {death.manner}{where} {when}{death.said}{wrote}"
+        unread = f"; its record cannot be read: {error}"
+    last_s, words = farewell(name, death, record, run.folder, run.checked.file_format)
+    words += unread
     return RunEnd(run.label, exit_code=3, problems=(words,), death=death, last_s=last_s)
+
+
+def farewell(
+    name: str, death: Death, record: Recorder | None, folder: Path, file_format: Format
+) -> tuple[float | None, str]:
+    """Write the record of a run that died; return the time of its last sample [s], None if it has
+    none, and how the run ended in a sentence.
+    """
+    last_s, wrote = None, ""
+    if record is not None and record.rows:
+        last_s = float(record.time[-1])
+        try:
+            wrote = f"; {_until(record.rows, record.write(folder, file_format))}"
+        except (InputError, OSError) as error:
+            wrote = f"; its record cannot be written: {error}"
+    when = f"after the sample at t = {last_s:.6g} s" if last_s is not None else "before its start"
+    return last_s, f"{name} {death.manner}{death.where} {when}{death.said}{wrote}"
 
 
 def _until(rows: int, file: Path) -> str:

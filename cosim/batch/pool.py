@@ -109,5 +109,4 @@ def _with_idle(work: Callable[[Children, J], E], job: J, idle: SimpleQueue[Child
 
 def sentence(death: Death) -> str:
     """Return how the process of a run ended, in a sentence."""
-    where = f" in {death.frame}" if death.frame else ""
-    return f"the process of the run {death.manner}{where}{death.said}"
+    return f"the process of the run {death.manner}{death.where}{death.said}"

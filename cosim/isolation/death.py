@@ -17,6 +17,7 @@ _MEANINGS: Final = {
 _FRAME: Final = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+) in (?P<function>\S+)')
 _PACKAGE: Final = Path(__file__).resolve().parents[1]
 _SERVER: Final = _PACKAGE / "isolation"  # below every work
+_CALLER: Final = "(fmi.py, "  # the file that calls FMUs and does little else
 _LONGEST: Final = 200  # characters of what a process printed last
 
 
@@ -63,6 +64,12 @@ class Death:
             return ""
         frame = (ours or frames)[0]
         return f"{frame['function']} ({Path(frame['file']).name}, line {frame['line']})"
+
+    @property
+    def where(self) -> str:
+        """Where it was, to follow its manner; nothing where that is not known."""
+        inside = " inside an FMU," if _CALLER in self.frame else ""
+        return f"{inside} in {self.frame}" if self.frame else ""
 
 
 def _is_ours(file: Path) -> bool:

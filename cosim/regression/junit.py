@@ -46,7 +46,7 @@ def _suite(one: Ended, run: RunEnd, number: int, started: datetime) -> ET.Elemen
     name = file.stem if len(one.runs) < 2 else f"{file.stem} ({run.label})"
     cases = [_run_case(one, run), *_verdict_cases(one, run)]
     suite = ET.Element("testsuite", {
-        "name": _clean(name), "package": _clean(".".join(file.parent.parts) or "."),
+        "name": _clean(name), "package": _clean(_dotted(file.parent) or "."),
         "id": str(number), "hostname": platform.node() or "localhost",
         "timestamp": started.isoformat(timespec="seconds"), "time": f"{run.wall_s:.3f}",
         "tests": str(len(cases)),
@@ -58,7 +58,8 @@ def _suite(one: Ended, run: RunEnd, number: int, started: datetime) -> ET.Elemen
         ET.SubElement(properties, "property", name=_clean(key), value=_clean(value))
     suite.extend(cases)
     ET.SubElement(suite, "system-out").text = _clean("\n".join(one.notes))
-    stack = run.death.stack if run.death is not None else ""
+    # What follows the frames is a list of the modules that are loaded.
+    stack = run.death.stack.partition("\nExtension modules")[0] if run.death is not None else ""
     ET.SubElement(suite, "system-err").text = _clean("\n".join((*run.problems, stack)).strip())
     return suite
 
@@ -85,11 +86,21 @@ def _verdict_cases(one: Ended, run: RunEnd) -> Iterator[ET.Element]:
 
 
 def _case(one: Ended, run: RunEnd, name: str, wall_s: float) -> ET.Element:
-    place = ".".join(one.job.scenario.with_suffix("").parts)
+    place = _dotted(one.job.scenario.with_suffix(""))
     where = place if len(one.runs) < 2 else f"{place}.{run.label}"
     return ET.Element(
         "testcase", name=_clean(name), classname=_clean(where), time=f"{wall_s:.3f}"
     )  # fmt: skip
+
+
+def _dotted(path: Path) -> str:
+    """Return a path as names of packages, seen from the working folder where it lies below it; a
+    dot in a name of its own would part it.
+    """
+    here = Path.cwd()
+    below = path.relative_to(here) if path.is_relative_to(here) else path
+    names = [part for part in below.parts if part not in (below.anchor, "..")]
+    return ".".join(name.replace(".", "_") for name in names)
 
 
 def verdicts_of(one: Ended, label: str) -> list[Verdict]:
