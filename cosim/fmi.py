@@ -61,9 +61,10 @@ class Description:
 class Slave:
     """An instance of an FMU whose chosen real inputs and outputs are NumPy arrays.
 
-    `inputs` (n_in,) is written by the caller before `step`; `outputs` (n_out,) and the Boolean
-    outputs `flags` (n_flags,) are filled by `read`. All are in the FMU's own units and never move
-    in memory. Every failing call raises `FmuError` with the FMU's own words.
+    `inputs` (n_in,) and the Boolean inputs `input_flags` are written by the caller before `step`;
+    `outputs` (n_out,) and the Boolean outputs `flags` (n_flags,) are filled by `read`. All are in
+    the FMU's own units and never move in memory. Every failing call raises `FmuError` with the
+    FMU's own words.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class Slave:
         inputs: Sequence[str],
         outputs: Sequence[str],
         flags: Sequence[str] = (),
+        input_flags: Sequence[str] = (),
     ) -> None:
         import fmpy
 
@@ -79,10 +81,11 @@ class Slave:
         self.messages: list[str] = []
         self.input_names, self.output_names = tuple(inputs), tuple(outputs)
         self.inputs: Array = np.zeros(len(inputs))
-        self.flag_names = tuple(flags)
+        self.flag_names, self.input_flag_names = tuple(flags), tuple(input_flags)
         self.outputs: Array = np.zeros(len(outputs))
         boolean = ctypes.c_int if description.major == 2 else ctypes.c_bool
         self.flags = np.zeros(len(flags), dtype=boolean)
+        self.input_flags = np.zeros(len(input_flags), dtype=boolean)
         self._folder = fmpy.extract(str(description.path))
         self._fmu: Any = None
         try:
@@ -120,8 +123,14 @@ class Slave:
             self._fmu = None
         shutil.rmtree(self._folder, ignore_errors=True)
 
+    @property
+    def held(self) -> str:
+        """The real inputs as they were written last, for a message."""
+        held = zip(self.input_names, self.inputs, strict=True)
+        return ", ".join(f"{name} = {value:.6g}" for name, value in held)
+
     def read(self) -> None:
-        """Fill `outputs`."""
+        """Fill `outputs` and `flags`."""
         self.messages.clear()
         status = self._get(*self._get_arguments)
         if self.flag_names and status <= _WARNING:
@@ -240,9 +249,11 @@ class Slave:
         self._get = self._function("fmi2GetReal" if major == 2 else "fmi3GetFloat64", access)
         self._put = self._function("fmi2SetReal" if major == 2 else "fmi3SetFloat64", access)
         self._get_flags = self._function(f"fmi{major}GetBoolean", access)
+        self._put_flags = self._function(f"fmi{major}SetBoolean", access)
         self._get_arguments = self._access(component, self.output_names, self.outputs)
         self._flag_arguments = self._access(component, self.flag_names, self.flags)
         self._put_arguments = self._access(component, self.input_names, self.inputs)
+        self._put_flag_arguments = self._access(component, self.input_flag_names, self.input_flags)
         if major == 2:
             signature = [pointer, double, double, number]
             self._step_arguments: tuple[Any, ...] = (
@@ -280,9 +291,11 @@ class Slave:
         return (*wrapped, size) if self.description.major == 3 else wrapped
 
     def _set_inputs(self) -> None:
-        if not self.input_names:
-            return
-        status = self._put(*self._put_arguments)
+        status = 0
+        if self.input_names:
+            status = self._put(*self._put_arguments)
+        if self.input_flag_names and status <= _WARNING:
+            status = self._put_flags(*self._put_flag_arguments)
         if status > _WARNING:
             raise self._failure("set the inputs", status)
 

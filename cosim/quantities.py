@@ -6,7 +6,7 @@ through a map from these quantities to its own variables (scenario field `vehicl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from sensor.channels import CHANNELS, COMMANDS, OUTPUTS, ROAD, STAGE
@@ -16,7 +16,9 @@ CORNERS: Final = ("FL", "FR", "RL", "RR")
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity, its SI unit, and where the built-in FMU has it (`scale` times `variable`)."""
+    """A quantity, its SI unit, and where the built-in FMU has it (`scale` times `variable`);
+    `boolean` is true or false, without a unit.
+    """
 
     name: str
     unit: str
@@ -24,6 +26,7 @@ class Quantity:
     variable: str
     scale: float = 1.0
     required: bool = True
+    boolean: bool = False
 
 
 def _own(name: str, unit: str, description: str, required: bool = True) -> Quantity:
@@ -103,3 +106,22 @@ DAMPERS: Final = tuple(
 OUTPUT_QUANTITIES: Final = (*CHANNEL_QUANTITIES, *TRUTH, *RECORDED)
 INPUT_QUANTITIES: Final = (*DRIVER, *DAMPERS)
 QUANTITIES: Final = {q.name: q for q in (*OUTPUT_QUANTITIES, *INPUT_QUANTITIES)}
+
+# What a controller FMU is given, of which it takes what it likes, and what it has to give.
+SENSOR_VALID: Final = Quantity(
+    "Sensor.Valid", "1", "whether the suspension velocities count", "Sensor.Valid",
+    required=False, boolean=True,
+)  # fmt: skip
+BODY_VELOCITY: Final = tuple(
+    _own(f"VBody.{c}", "m/s", f"velocity of the body at the corner {c}, positive upward", False)
+    for c in CORNERS
+)
+BODY_ACCELERATION: Final = tuple(
+    _own(f"ABody.{c}", "m/s2", f"acceleration of the body at the corner {c}, positive up", False)
+    for c in CORNERS
+)
+CONTROLLER_INPUTS: Final = (
+    *(replace(q, required=False) for q in (*CHANNEL_QUANTITIES, *ESTIMATE)),
+    *ESTIMATE_DEVIATION, *BODY_VELOCITY, *BODY_ACCELERATION, SENSOR_VALID,
+)  # fmt: skip
+CONTROLLER_OUTPUTS: Final = DAMPERS

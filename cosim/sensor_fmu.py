@@ -10,13 +10,14 @@ import numpy.typing as npt
 
 from cosim.errors import FmuError, did_you_mean
 from cosim.fmi import KINDS, Description, Slave
+from cosim.quantities import SENSOR_VALID
 from sensor.channels import CHANNELS, COMMANDS, OUTPUTS, SAMPLE_RATE_HZ, Channel
 from sensor.estimator import sample_by_sample
 
 Array = npt.NDArray[np.float64]
 
 STEP_S: Final = 1 / SAMPLE_RATE_HZ
-VALID: Final = "Sensor.Valid"
+VALID: Final = SENSOR_VALID.name
 DEVIATIONS: Final = tuple(o.name.replace("VRel.", "VRel.Deviation.") for o in OUTPUTS)
 
 

@@ -110,13 +110,10 @@ class Vehicle:
             return
         for name, value in zip(self._slave.output_names, outputs, strict=True):
             if not np.isfinite(value):
-                held = ", ".join(
-                    f"{n} = {v:.6g}"
-                    for n, v in zip(self._slave.input_names, self._slave.inputs, strict=True)
-                )
                 raise FmuError(
                     f"{self._slave.description.path.name}: {name} is {value} at "
-                    f"t = {self._k * self.step_s:.6g} s; the last inputs were {held}"
+                    f"t = {self._k * self.step_s:.6g} s; the last inputs were "
+                    f"{self._slave.held}"
                 )
 
     def _hold(self) -> None:
