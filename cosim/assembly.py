@@ -16,6 +16,8 @@ from cosim import loop
 from cosim.bus.assemble import bus_problems, bus_sensor
 from cosim.control.choice import controller_of
 from cosim.control.damper_map import damper_map
+from cosim.control.from_fmu import controller_problems, fmu_controller
+from cosim.controller_fmu import FmuController
 from cosim.course import Course, course_of
 from cosim.driver import PathDriver
 from cosim.errors import InputError, Problem
@@ -39,7 +41,7 @@ from cosim.realtime.clock import Clock, clock_of
 from cosim.record import record_groups_of
 from cosim.recorder import Recorder
 from cosim.ride import Ride, ride_figures
-from cosim.scenario.controllers import Controller, Passive
+from cosim.scenario.controllers import Controller, ControllerFmu, Passive
 from cosim.scenario.schema import Scenario
 from cosim.sensor import estimator_file, estimator_of, measurement_of, stage_problems
 from cosim.sensor_fmu import FmuSensor
@@ -96,6 +98,7 @@ class Assembly:
     steps: int
     if_late: str  # why the run ends where the driver has not come to the end
     sensor_fmu: FmuSensor | None = None  # the estimator behind the sensor, if it is an FMU
+    controller_fmu: FmuController | None = None  # what commands the dampers, if it is an FMU
     bus: BusSensor | None = None
 
     def run(self, progress: Callable[[int, int], None] | None) -> RunResult:
@@ -103,6 +106,8 @@ class Assembly:
         try:
             if self.bus is not None:
                 self.bus.open()
+            if self.controller_fmu is not None:
+                self.controller_fmu.connect()
             self.blocks.vehicle.connect()
             begin = time.perf_counter()
             with self.clock:
@@ -112,6 +117,8 @@ class Assembly:
             self.blocks.vehicle.stop()
             if self.sensor_fmu is not None:
                 self.sensor_fmu.close()
+            if self.controller_fmu is not None:
+                self.controller_fmu.close()
             if self.bus is not None:
                 self.bus.close()
         done = self.driver.completed
@@ -174,12 +181,16 @@ def assemble(
     sensor = late_sensor(sensor, latency)
     passive = isinstance(controller, Passive) and dampers is None
     start = start_values(scenario, description, course, plan, passive)
-    block = dampers or controller_of(controller, damper_map(scenario.parameters))
+    fmu = None
+    if dampers is None and isinstance(controller, ControllerFmu):
+        fmu = fmu_controller(scenario, controller)
+    block = dampers or controller_of(controller, damper_map(scenario.parameters), fmu)
     steps, if_late = _steps(scenario, plan)
     driver = plan.driver(STEP_S, friction_of(scenario))
     recorder = Recorder(record_groups_of(scenario, controller), steps + 1, STEP_S)
     vehicle = bench or Vehicle(description, wiring, start, STEP_S, block.command)
     files = {"fmu": description.path, "sensor": file, "road": course.file}
+    files |= {} if fmu is None else {"controller": fmu.path}
     files |= {f"variant {name}": path for name, path in scenario.variants.files.items()}
     files |= {f"fault {name}": path for name, path in scenario.fault_files.items()}
     return Assembly(
@@ -201,6 +212,7 @@ def assemble(
         steps=steps,
         if_late=if_late,
         sensor_fmu=own if isinstance(own, FmuSensor) else None,
+        controller_fmu=fmu,
         bus=bus,
     )
 
@@ -223,6 +235,7 @@ def checked_parts(
     )
     problems += checked_parameters(scenario, description)
     problems += stage_problems(scenario, wiring, description.path.name) + bus_problems(scenario)
+    problems += controller_problems(scenario)
     found = None
     try:
         found = _planned(scenario, roads)

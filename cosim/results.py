@@ -75,7 +75,7 @@ def resolved_yaml(scenario: Scenario) -> str:
         data["vehicle"]["fmu"] = str(scenario.resolve(scenario.vehicle.fmu).resolve())
         del data["vehicle"]["fmi_version"]
     for part in (data["sensor"], *data["controllers"]):
-        for kind in {"network", "fmu"} & part.keys():
+        for kind in {"network", "fmu", "file"} & part.keys():
             part[kind] = str(scenario.resolve(part[kind]).resolve())
     for own, controller in zip(data["controllers"], scenario.controllers, strict=True):
         if getattr(controller, "fallback", None) is not None:

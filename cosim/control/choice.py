@@ -17,15 +17,17 @@ from cosim.scenario import controllers as settings
 from sensor.channels import PASSIVE_COMMAND
 
 
-def controller_of(chosen: settings.Controller, dampers: DamperMap) -> ControllerBlock:
-    """Return the block of a controller, fresh; `dampers` is the map that its law knows."""
+def controller_of(
+    chosen: settings.Controller, dampers: DamperMap, fmu: ControllerBlock | None = None
+) -> ControllerBlock:
+    """Return the block of a controller, fresh; `dampers` is the map that its law knows, `fmu` what
+    stands in a law's place where the controller is an FMU.
+    """
     if isinstance(chosen, settings.Passive):
         return FixedDampers(PASSIVE_COMMAND)
     if isinstance(chosen, settings.Fixed):
         return FixedDampers(chosen.command)
-    body = Body()
-    law = _law(chosen, dampers, body)
-    controller = LawController(law, chosen.feedback == "truth", chosen.initial_command, body)
+    controller = _fmu(fmu) if isinstance(chosen, settings.ControllerFmu) else _own(chosen, dampers)
     safe = chosen.fallback
     if safe is None:
         return controller
@@ -33,6 +35,18 @@ def controller_of(chosen: settings.Controller, dampers: DamperMap) -> Controller
         safe.command, safe.largest_deviation_m_s, safe.fade_s, safe.back_after_s
     )
     return Fallback(controller, parameters)
+
+
+def _fmu(block: ControllerBlock | None) -> ControllerBlock:
+    if block is None:
+        raise ValueError("a controller of kind fmu comes with its block")
+    return block
+
+
+def _own(chosen: settings.LawSettings, dampers: DamperMap) -> LawController:
+    body = Body()
+    law = _law(chosen, dampers, body)
+    return LawController(law, chosen.feedback == "truth", chosen.initial_command, body)
 
 
 def _law(chosen: settings.LawSettings, dampers: DamperMap, body: Body) -> Law:

@@ -116,6 +116,7 @@ def _files(scenario: Scenario, fmu: Path, road: Path) -> list[dict[str, str]]:
 
     files: dict[str, Path | None] = {
         "scenario": scenario.file, "vehicle": fmu, "road": road, **_sensors(scenario),
+        **_controllers(scenario),
         **{f"variant {n}": p for n, p in scenario.variants.files.items()},
         **{f"fault {n}": p for n, p in scenario.fault_files.items()},
     }  # fmt: skip
@@ -136,6 +137,14 @@ def _sensors(scenario: Scenario) -> dict[str, Path | None]:
         if file not in files.values():
             files[f"sensor of {controller.label}"] = file
     return files
+
+
+def _controllers(scenario: Scenario) -> dict[str, Path | None]:
+    """Return the FMUs that are controllers."""
+    from cosim.scenario.controllers import ControllerFmu
+
+    fmus = (c for c in scenario.controllers if isinstance(c, ControllerFmu))
+    return {f"controller {c.label}": scenario.resolve(c.file) for c in fmus}
 
 
 def _tables(facts: Facts, values: list[Value]) -> None:

@@ -15,6 +15,7 @@ from cosim.control.skyhook import HARD_COMMAND, SKYHOOK_GAIN
 from cosim.scenario.latency import Latency
 from cosim.scenario.model import NAME_PATTERN, Model, with_unit
 from cosim.scenario.sensor import EstimatorName, Sensor
+from cosim.scenario.vehicle import Parameter, Variable
 from sensor.channels import PASSIVE_COMMAND
 from sensor.estimators import names
 
@@ -242,8 +243,31 @@ class ModalSkyhook(Law):
     )
 
 
+class ControllerFmu(Law):
+    """A controller that is an FMU."""
+
+    kind: Literal["fmu"]
+    file: str = Field(
+        min_length=1, description="controller FMU, relative to the scenario (fmu is a sensor's)"
+    )
+    variables: dict[str, Variable] = Field(
+        default_factory=dict, description="quantity to variable, for an FMU with other names"
+    )
+    parameters: dict[str, Parameter] = Field(
+        default_factory=dict, description="start values by the FMU's names, in its units"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named_by_file(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "fmu" in data and "file" not in data:
+            sentence = "the controller's FMU is named by file; fmu is a sensor FMU"
+            raise PydanticCustomError("controller_fmu", sentence)
+        return data
+
+
 LawSettings = Skyhook | CautiousSkyhook | TwoStateSkyhook | Add | SkyhookAdd | Hybrid | ModalSkyhook
-Controller = Annotated[Passive | Fixed | LawSettings, Field(discriminator="kind")]
+Controller = Annotated[Passive | Fixed | LawSettings | ControllerFmu, Field(discriminator="kind")]
 
 
 def label_of(controller: dict[str, Any]) -> str:

@@ -35,6 +35,7 @@ FILE_FIELDS: Final[tuple[FileField, ...]] = (
 CONTROLLER_FILE_FIELDS: Final[tuple[FileField, ...]] = (
     (("network",), None, *_NETWORK),
     (("fmu",), None, *_SENSOR_FMU),
+    (("file",), None, ".fmu", "a controller FMU"),
 )
 
 

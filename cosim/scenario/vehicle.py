@@ -19,7 +19,7 @@ def _check_parameter(value: object) -> object:
 
 
 class Variable(Model):
-    """Which variable of another vehicle FMU carries a quantity."""
+    """Which variable of another FMU carries a quantity."""
 
     name: str = Field(min_length=1, description="name of the variable in the FMU")
     unit: str | None = Field(default=None, description="its unit, if the FMU does not say")
