@@ -132,8 +132,8 @@ def test_a_run_that_crashes_leaves_its_rows_and_the_other_runs(batch: Batch) -> 
     sentence = (
         r"error: set/more/aborts\.yaml: the run fixed crashed \(SIGABRT, it gave up\) inside "
         r"an FMU, in \w+ \(fmi\.py, line \d+\) after the sample at t = 0\.56 s; it printed: "
-        r"parrot\.c: assertion failed: it is only resting; the 57 samples until then are in results/aborts/fixed/"
-        r"signals\.csv\n"
+        r"parrot\.c: assertion failed: it is only resting; the 57 samples until then are in "
+        r"results/aborts/fixed/signals\.csv\n"
     )
     assert re.search(sentence, said)
     rows = {
