@@ -73,12 +73,13 @@ def test_a_nan_stays_one(library: ctypes.CDLL) -> None:
             assert np.isnan(function(library, kernel, name, x)).all()
 
 
+@pytest.mark.parametrize("units", [45, 39, 48])  # of the last 16: 13, 7, which end within 8, all
 @pytest.mark.parametrize("kind", ["windowed", "carried"])
 def test_kernels_differ_by_rounding_only_and_repeat_their_bits(
-    library: ctypes.CDLL, tmp_path: Path, kind: str
+    library: ctypes.CDLL, tmp_path: Path, kind: str, units: int
 ) -> None:
-    windowed = windowed_network(19, 45, 33, True)
-    network = windowed if kind == "windowed" else carried_network(20, 45, 33)
+    windowed = windowed_network(19, units, 33, True)
+    network = windowed if kind == "windowed" else carried_network(20, units, 33)
     content = blob(read_network(exported(network, tmp_path)))
     channels, commands = drive(150)
     results = {}

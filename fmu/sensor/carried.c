@@ -30,7 +30,7 @@ static Scratch divided(const Network *n, float *scratch) {
 /* Standardised features -> the LSTM's new output, in the state. */
 static const float *recurrent(const Network *n, void *state, const Scratch *s) {
     float *hidden = delay_line(state) + line_room(n), *cell = hidden + n->padded;
-    const Rows row = {1, s->both, 0, s->next, cell, 0};
+    const Rows row = {1, s->both, 0, s->next, cell, 0, n->units};
     n->kernel->product(&n->front, s->features, s->front);
     n->kernel->bend(BLOCK * n->front.blocks, s->front);
     memcpy(s->both, s->front, n->front_units * sizeof *hidden);

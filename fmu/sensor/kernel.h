@@ -17,6 +17,7 @@ typedef struct {
     float *hidden; /* out, not the input: [count] rows of 16 * blocks, `step` apart */
     float *cell;   /* in and out, likewise */
     size_t step;
+    size_t units; /* of each row; what fills it up to a multiple of 16 becomes zero in `hidden` */
 } Rows;
 
 typedef struct Kernel {

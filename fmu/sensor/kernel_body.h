@@ -24,6 +24,7 @@
 #endif
 
 #define GATES 4
+#define HALF 2
 #define CACHE_LINE 16 /* numbers */
 #define PARTS (BLOCK_UNITS / LANES)
 #define GATE_STEP (LANES < 8 ? 8 : LANES)
@@ -112,7 +113,8 @@ typedef struct {
     size_t soon_step;
 } Tile;
 
-INLINE void advance_rows(const int count, Tile t) {
+/* `vectors` are GATES, or HALF of them where the others belong to units that only fill the block. */
+INLINE void advance_rows(const int count, const int vectors, Tile t) {
     Sums sum[ROWS];
     UNROLLED for (int r = 0; r < count; ++r) {
         UNROLLED for (int g = 0; g < GATES; ++g) sum[r].gate[g] = load(t.start + g * GATE_STEP);
@@ -121,7 +123,7 @@ INLINE void advance_rows(const int count, Tile t) {
         Vector x[ROWS];
         FETCH(t.soon);
         UNROLLED for (int r = 0; r < count; ++r) x[r] = splat(t.input[r * t.input_step + k]);
-        UNROLLED for (int g = 0; g < GATES; ++g) {
+        UNROLLED for (int g = 0; g < vectors; ++g) {
             const Vector weight = load(t.matrix + g * GATE_STEP);
             UNROLLED for (int r = 0; r < count; ++r) sum[r].gate[g] = times_plus(x[r], weight, sum[r].gate[g]);
         }
@@ -154,30 +156,48 @@ INLINE void advance_row(Tile t) {
     advance_cell(sum[0], t.hidden, t.cell);
 }
 
-static void advance_tile(size_t count, const Tile *tile) {
+INLINE void advance_tile(size_t count, const int vectors, const Tile *tile) {
+    (void)vectors; /* where there is one row at a time */
     switch (count) {
     case 1: advance_row(*tile); break;
 #if ROWS > 1
-    case 2: advance_rows(2, *tile); break;
+    case 2: advance_rows(2, vectors, *tile); break;
 #endif
 #if ROWS > 2
-    case 3: advance_rows(3, *tile); break;
+    case 3: advance_rows(3, vectors, *tile); break;
 #endif
 #if ROWS > 3
-    case 4: advance_rows(4, *tile); break;
-    case 5: advance_rows(5, *tile); break;
-    case 6: advance_rows(6, *tile); break;
+    case 4: advance_rows(4, vectors, *tile); break;
+    case 5: advance_rows(5, vectors, *tile); break;
+    case 6: advance_rows(6, vectors, *tile); break;
 #endif
     default: break;
     }
 }
 
+static void advance_whole_tile(size_t count, const Tile *tile) { advance_tile(count, GATES, tile); }
+#ifdef PAIR
+static void advance_half_tile(size_t count, const Tile *tile) { advance_tile(count, HALF, tile); }
+#endif
+
+/* A tile of `units` units: a kernel whose vectors hold two gates leaves those out that only fill the block. */
+static void advance_units(size_t units, size_t count, const Tile *tile) {
+#ifdef PAIR
+    if (units <= LANES / 2) {
+        advance_half_tile(count, tile);
+        return;
+    }
+#endif
+    (void)units;
+    advance_whole_tile(count, tile);
+}
+
 /* All rows of a part of a block, in tiles as equal as they can be. */
-static void advance_part(Tile tile, size_t rows) {
+static void advance_part(Tile tile, size_t rows, size_t units) {
     const float *soon_end = tile.soon + tile.depth * BLOCK;
     for (size_t tiles = (rows + ROWS - 1) / ROWS; tiles > 0; --tiles) {
         const size_t count = (rows + tiles - 1) / tiles;
-        advance_tile(count, &tile);
+        advance_units(units, count, &tile);
         rows -= count;
         tile.input += count * tile.input_step;
         tile.hidden += count * tile.step;
@@ -187,15 +207,23 @@ static void advance_part(Tile tile, size_t rows) {
     }
 }
 
+static void clear_part(size_t rows, float *hidden, size_t step) {
+    for (size_t r = 0; r < rows; ++r) store(hidden + r * step, splat(0.0f));
+}
+
 static void advance(const Layer *layer, const float *start, const Rows *rows) {
     const size_t size = layer->depth * BLOCK;
     for (size_t b = 0; b < layer->blocks; ++b)
         for (size_t p = 0; p < PARTS; ++p) {
             const size_t unit = b * BLOCK_UNITS + p * LANES, next = b + 1 < layer->blocks ? b + 1 : 0;
+            if (unit >= rows->units) {
+                clear_part(rows->count, rows->hidden + unit, rows->step);
+                continue;
+            }
             const Tile tile = {layer->matrix + b * size + part_place(p), start + b * BLOCK + part_place(p), rows->input, layer->depth,
                                rows->input_step, rows->step, rows->hidden + unit, rows->cell + unit, layer->matrix + next * size,
                                p ? 0 : CACHE_LINE};
-            advance_part(tile, rows->count);
+            advance_part(tile, rows->count, rows->units - unit);
         }
 }
 

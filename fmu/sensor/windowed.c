@@ -54,7 +54,7 @@ bool windowed_step(const Network *n, void *state, float *scratch, const float sa
     for (int i = 0; i < CHANNELS; ++i) newest[i] = (sample[i] - n->input_mean[i]) / n->input_std[i];
 
     const size_t turn = flight->turn, under_way = flight->under_way;
-    const Rows rows = {under_way, hidden, step, s.next, cell, step};
+    const Rows rows = {under_way, hidden, step, s.next, cell, step, n->units};
     n->kernel->product(&n->forward_input, newest, s.gates);
     n->kernel->advance(&n->lstm, s.gates, &rows);
     memcpy(hidden, s.next, under_way * step * sizeof *hidden);
