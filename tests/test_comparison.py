@@ -73,6 +73,24 @@ def test_runs_of_one_name_are_told_apart_by_their_scenario_s_folder(
     assert names == ["loop/passive", "skyhook", "lap/passive"]
 
 
+def test_one_scenario_from_two_folders_is_told_apart_by_what_lies_above(tmp_path: Path) -> None:
+    runs = {"passive": figures(0.6, 700), "skyhook": figures(0.45, 665)}
+    before = results(tmp_path / "before" / "loop", runs)
+    after = results(tmp_path / "after" / "loop", runs)
+    alone = results(tmp_path / "alone", {"skyhook": figures(0.5, 680)})
+    assert [run.name for run in read_runs([before, after / "skyhook", alone])] == [
+        "passive", "before/loop/skyhook", "after/loop/skyhook", f"{tmp_path.name}/alone/skyhook",
+    ]  # fmt: skip
+
+
+def test_a_run_that_alone_has_ended_lies_below_its_scenario_s_folder(both: Path) -> None:
+    metrics = json.loads((both / "metrics.json").read_text())
+    del metrics["runs"]["skyhook"]
+    (both / "metrics.json").write_text(json.dumps(metrics))
+    other = results(both.parent / "lap", {"other": figures(0.5, 680)})
+    assert [run.folder for run in read_runs([both, other])] == [both / "passive", other]
+
+
 @pytest.mark.parametrize("file_format", ["csv", "parquet"])
 def test_signals_come_back_as_they_were_written(tmp_path: Path, file_format: Format) -> None:
     runs = {"one": figures(0.5, 600), "two": figures(0.4, 600)}
@@ -95,6 +113,15 @@ def test_runs_of_different_scenarios_are_compared_with_a_warning(
 ) -> None:
     other = results(tmp_path / "lap", {"one": figures(0.5, 680)}, "a lap")
     assert "different scenarios" in table_of(read_runs([both, other])).note
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(40.0, False), (40.3, False), (20.0, True)])
+def test_runs_of_different_length_are_told(tmp_path: Path, seconds: float, told: bool) -> None:
+    runs = {"one": figures(0.5, 600), "two": figures(0.4, 600)}
+    runs["one"]["simulated_s"], runs["two"]["simulated_s"] = 40.0, seconds
+    note = table_of(read_runs([results(tmp_path / "out", runs)])).note
+    assert ("The runs last from 20 to 40 s; VDV and damper energy grow" in note) == told
+    assert ("VDV" in note) == told
 
 
 def test_every_column_is_a_figure_that_runs_have() -> None:
@@ -190,6 +217,25 @@ def test_all_mistakes_at_once(both: Path, tmp_path: Path) -> None:
     ):
         assert words in result.stderr
     assert "Traceback" not in result.output
+
+
+@pytest.mark.parametrize(("end", "content"), [("csv", ""), ("csv", "time\nx\n"), ("parquet", "x")])
+def test_signals_that_are_no_table_are_said(
+    both: Path, tmp_path: Path, end: str, content: str
+) -> None:
+    (both / "passive" / "signals.csv").unlink()
+    (both / "passive" / f"signals.{end}").write_text(content)
+    result = compare(both, "--output", tmp_path / "c.html")
+    assert result.exit_code == 2
+    assert f"signals.{end}' cannot be read: " in result.stderr
+    assert isinstance(result.exception, SystemExit)
+
+
+@pytest.mark.parametrize("runs", [[], {"one": 3}])
+def test_metrics_without_figures_by_name_are_said(tmp_path: Path, runs: Any) -> None:
+    (tmp_path / "metrics.json").write_text(json.dumps({"scenario": "a road", "runs": runs}))
+    with pytest.raises(InputError, match="its runs have no figures by name"):
+        read_runs([tmp_path])
 
 
 def test_one_run_is_no_comparison(both: Path) -> None:

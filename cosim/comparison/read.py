@@ -32,17 +32,26 @@ class ComparedRun:
     folder: Path
 
     def signals(self, names: Sequence[str]) -> dict[str, Array]:
-        """Return `time` and those of the signals (rows,) that the run has, none without a file."""
-        for file, read in ((f"signals.{end}", read) for end, read in _READERS.items()):
-            if (self.folder / file).is_file():
-                return read(self.folder / file, ("time", *names))
+        """Return `time` and those of the signals (rows,) that the run has, none without a file.
+
+        Raises `InputError` for a file that cannot be read.
+        """
+        for end, read in _READERS.items():
+            file = self.folder / f"signals.{end}"
+            if not file.is_file():
+                continue
+            try:
+                return read(file, ("time", *names))
+            except ValueError as error:  # what pandas and pyarrow raise for a file that is no table
+                raise InputError(f"'{file}' cannot be read: {error}") from None
         return {}
 
 
 def read_runs(paths: Sequence[Path]) -> list[ComparedRun]:
     """Return the runs in folders of results: all of a scenario's, or the one of a run's own folder.
 
-    Each is named by its run where that tells them apart, else with its scenario's folder before it.
+    Each is named by its run where that tells them apart, else with as many of the folders above it
+    as that takes.
     Raises `InputError` with everything wrong: no results in a folder, a run twice, fewer than two.
     """
     found: dict[Path, tuple[str, str, Mapping[str, Any], Path]] = {}
@@ -69,8 +78,8 @@ def _runs_in(path: Path) -> list[tuple[str, str, Mapping[str, Any], Path]]:
     if (path / METRICS).is_file():
         metrics = _metrics(path)
         runs = metrics["runs"]
-        alone = len(runs) == 1
-        folders = {label: path if alone else path / label for label in runs}
+        # A run that is alone lies in the folder itself, unless others beside it never ended.
+        folders = {label: path / label if (path / label).is_dir() else path for label in runs}
         return [(label, metrics["scenario"], runs[label], folders[label]) for label in runs]
     parent = path.resolve().parent
     if (parent / METRICS).is_file():
@@ -91,18 +100,36 @@ def _metrics(folder: Path) -> dict[str, Any]:
         raise InputError(f"'{file}' cannot be read: {error}") from None
     if not isinstance(metrics, dict) or not {"scenario", "runs"} <= metrics.keys():
         raise InputError(f"'{file}' is not what cosim run writes: it has no scenario or no runs")
+    runs = metrics["runs"]
+    if not isinstance(runs, dict) or not all(isinstance(run, dict) for run in runs.values()):
+        raise InputError(f"'{file}' is not what cosim run writes: its runs have no figures by name")
     return metrics
 
 
 def _named(runs: list[tuple[str, str, Mapping[str, Any], Path]]) -> list[ComparedRun]:
     labels = [label for label, *_ in runs]
+    above = [_above(label, folder) for label, *_, folder in runs]
     named = []
-    for label, scenario, figures, folder in runs:
-        own = folder.resolve()
-        above = own.parent.name if own.name == label else own.name
-        name = label if labels.count(label) == 1 else f"{above}/{label}"
+    for (label, scenario, figures, folder), parts in zip(runs, above, strict=True):
+        same = [a for other, a in zip(labels, above, strict=True) if other == label]
+        depth = 0 if len(same) == 1 else _depth(same)
+        name = "/".join((*parts[len(parts) - min(depth, len(parts)) :], label))
         named.append(ComparedRun(name, scenario, figures, folder))
     return named
+
+
+def _above(label: str, folder: Path) -> tuple[str, ...]:
+    """Return the names of the folders that a run's results lie in, its scenario's the last."""
+    own = folder.resolve()
+    parts = (own.parent if own.name == label else own).parts
+    return tuple(part for part in parts if part != own.anchor)
+
+
+def _depth(folders: Sequence[tuple[str, ...]]) -> int:
+    """Return how many names, from the end on, tell these folders apart."""
+    longest = max(len(parts) for parts in folders)
+    depths = (n for n in range(1, longest) if len({p[-n:] for p in folders}) == len(folders))
+    return next(depths, longest)
 
 
 def _csv(file: Path, names: Sequence[str]) -> dict[str, Array]:

@@ -21,6 +21,8 @@ COLUMNS: Final[Mapping[str, str]] = {
     "comfort.pitch_rate_rms_deg_s": "pitch rate rms",
     "comfort.damper_energy_j": "damper energy",
     "decisions.wrong_percent": "wrong decisions",
+    "fallback.active_percent": "fallback active",
+    "fallback.force_step_n": "fallback's force step",
     "against_truth.gain_kept_percent": "comfort gain kept",
     "against_truth.tyre_load_percent": "tyre load against truth's",
     "sensor.overall.rmse_m_s": "estimate's RMSE",
@@ -28,6 +30,8 @@ COLUMNS: Final[Mapping[str, str]] = {
 }
 RELATIVE: Final = "comfort."
 """Figures of which the change against the first run is shown too."""
+SAME_LENGTH: Final = 0.01
+"""Share by which runs may differ in length, as laps do, without a word about it."""
 
 
 def table_of(runs: Sequence[ComparedRun]) -> Table:
@@ -38,7 +42,20 @@ def table_of(runs: Sequence[ComparedRun]) -> Table:
     note = f"Changes in % against {runs[0].name}."
     if len({run.scenario for run in runs}) > 1:
         note += " The runs are of different scenarios: read the changes with care."
+    note += _lengths(runs)
     return Table("Runs compared", ("run", *titles), tuple(rows), note)
+
+
+def _lengths(runs: Sequence[ComparedRun]) -> str:
+    """Return a sentence where the runs are not about as long as each other, else nothing."""
+    found = [figure(run.figures, "simulated_s") for run in runs]
+    lengths = [length for length in found if length is not None]
+    if not lengths or max(lengths) <= (1.0 + SAME_LENGTH) * min(lengths):
+        return ""
+    return (
+        f" The runs last from {min(lengths):g} to {max(lengths):g} s; VDV and damper energy grow"
+        " with time."
+    )
 
 
 def _cell(first: Mapping[str, Any], figures: Mapping[str, Any], path: str) -> str:
