@@ -150,7 +150,8 @@ def execute(
 
     `command` is the command line that the report shows; `assemble` connects the blocks of a run
     (default: `cosim.assembly.assemble`). Raises `InputError` for what a user can mend, `FmuError`
-    or `NetworkError` for a block that fails; rows recorded until then are written first.
+    or `NetworkError` for a block that fails; rows recorded until then, and the figures of the runs
+    that have ended, are written first.
     """
     from cosim.provenance import add_files, provenance
 
@@ -158,15 +159,20 @@ def execute(
     prepare(output_dir, scenario)
     runs: list[RunOutcome] = []
     versions: dict[str, Any] = {}
-    for controller in scenario.controllers:
-        with network_errors():
-            assembly = assemble(scenario, controller)
-        if not versions:
-            versions = provenance({"scenario": scenario.file}, command)
-        add_files(versions, assembly.files, controller.label)
-        write_json(output_dir / "versions.json", versions)
-        folder = folder_of(scenario, output_dir, controller.label)
-        runs.append(drive(scenario, controller, assembly, folder, progress))
+    try:
+        for controller in scenario.controllers:
+            with network_errors():
+                assembly = assemble(scenario, controller)
+            if not versions:
+                versions = provenance({"scenario": scenario.file}, command)
+            add_files(versions, assembly.files, controller.label)
+            write_json(output_dir / "versions.json", versions)
+            folder = folder_of(scenario, output_dir, controller.label)
+            runs.append(drive(scenario, controller, assembly, folder, progress))
+    except BaseException:
+        if runs:  # an interrupt or a failure does not take their figures with it
+            conclude(scenario, output_dir, runs, versions)
+        raise
     return conclude(scenario, output_dir, runs, versions)
 
 

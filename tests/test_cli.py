@@ -163,6 +163,23 @@ def test_an_interrupted_run_says_so(cosim):
     assert "interrupted" in result.stderr
 
 
+@pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt, 130), (SensorError, 3)])
+def test_the_figures_of_runs_that_ended_outlive_a_later_one_s_failure(cosim, error, code):
+    ended = []
+
+    def second_fails(*_):
+        if ended:
+            raise error("no more")
+        ended.append(StandIn())
+        return ended[0]
+
+    assert cosim("loop.yaml", assemble=second_fails).exit_code == code
+    metrics = json.loads(Path("results/loop/metrics.json").read_text())
+    assert list(metrics["runs"]) == ["passive"]
+    assert metrics["runs"]["passive"]["simulated_s"] == 1.99
+    assert Path("results/loop/report.html").exists()
+
+
 def test_closed_loop_compares_the_controllers(cosim):
     result = cosim("loop.yaml")
     assert result.exit_code == 0, result.output
