@@ -18,7 +18,7 @@ from cosim.assembly import assemble
 from cosim.bus.codec import from_sensor, to_sensor
 from cosim.bus.transport import Address, Link
 from cosim.cli import main
-from cosim.errors import InputError
+from cosim.errors import BusError, InputError
 from cosim.run import execute
 from cosim.scenario.load import load
 from cosim.scenario.schema import Scenario
@@ -133,6 +133,24 @@ def test_a_node_that_cannot_start_says_why_before_the_first_step(tmp_path):
     assert result.exit_code == 3
     assert "has ended" in result.stderr
     assert "broken.onnx" in result.stderr
+
+
+def test_the_end_of_the_run_s_own_node_is_the_end_of_the_run(tmp_path):
+    section = bus_section(free_udp(), "connect_s: 120", "start_node: true")
+    section = section.replace("deadline_ms: 5000", "deadline_ms: 1000")
+    path = write_scenario(tmp_path, sections={"sensor": section})
+    scenario = load(path)
+    assembly = assemble(scenario, scenario.controllers[0])
+    own = assembly.bus._process
+
+    def kill(done: int, total: int) -> None:
+        if done == 50:
+            own._process.kill()
+
+    with pytest.raises(BusError, match=r"the sensor on bus .* has ended: signal 9 \(Killed"):
+        assembly.run(kill)
+    assert assembly.recorder.rows == 51
+    assert "frames_lost" not in assembly.bus.figures()
 
 
 def test_another_estimator_on_the_bus_than_in_the_scenario(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -36,6 +37,8 @@ class NodeProcess:
         process = self._process
         if process is None or process.poll() is None or process.stderr is None:
             return None
+        if process.returncode < 0:
+            return f"signal {-process.returncode} ({signal.strsignal(-process.returncode)})"
         lines = process.stderr.read().strip().splitlines()
         return lines[-1].removeprefix("error: ") if lines else f"exit code {process.returncode}"
 

@@ -91,7 +91,7 @@ class BusSensor:
 
     def step(self, measured: Array, command: Array) -> bool:
         """Send the channels (14,) and the damper command (4,) held until now; return whether there
-        is an estimate that counts.
+        is an estimate that counts. Raises `BusError` where the bus fails, or the run's own sensor.
         """
         if self._open is None:
             raise BusError(f"bus {self._address} is not open")
@@ -165,6 +165,13 @@ class BusSensor:
                 self._in_time += 1
                 return
         self._in_vain_s += time.perf_counter() - begin
+        self._check_process()
+
+    def _check_process(self) -> None:
+        """Raise `BusError` where the run's own sensor has ended; another's may come back."""
+        if (words := self._last_words()) is not None:
+            self._in_vain_s = SILENCE_S  # nobody is there to say goodbye to
+            raise BusError(f"the sensor on bus {self._address} has ended: {words}")
 
     def _use(self, number: int) -> bool:
         """Take over the newest estimate if it counts for sample `number`."""
