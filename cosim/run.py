@@ -208,7 +208,7 @@ def drive(
     from cosim.control.figures import control_figures
     from cosim.faults.figures import fault_figures
 
-    label = controller.label
+    label, latency = controller.label, controller.latency_of_run(scenario.latency)
 
     def tell(done: int, total: int) -> None:
         if progress is not None:
@@ -233,7 +233,7 @@ def drive(
         **compare(assembly.recorder, assembly.initial_command, scenario.sensor.condition),
         "faults": fault_figures(scenario.acting_faults, assembly.recorder),
         "comfort": dict(result.comfort),
-        **control_figures(controller, assembly.recorder, damper_map(scenario.parameters)),
+        **control_figures(controller, assembly.recorder, damper_map(scenario.parameters), latency),
         "manoeuvre": dict(result.manoeuvre),
         "grip": dict(result.grip),
         "timing": dict(result.timing),

@@ -63,10 +63,11 @@ def test_it_waits_until_the_estimate_was_trusted_without_a_break() -> None:
     ("deviation", "trusted"),
     [(0.05, True), (0.0999, True), (0.11, False), (np.nan, True)],
 )
-def test_a_deviation_at_one_wheel_decides(deviation: float, trusted: bool) -> None:
+@pytest.mark.parametrize("first", [0.01, np.nan])
+def test_a_deviation_at_one_wheel_decides(deviation: float, trusted: bool, first: float) -> None:
     parameters = FallbackParameters(SAFE, largest_deviation=0.1, fade=0.01, back_after=0.0)
     fallback = Fallback(Restless(), parameters)
-    expected = np.array([0.01, 0.02, deviation, 0.01])
+    expected = np.array([first, 0.02, deviation, 0.01])
     for _ in range(5):
         known = sample(None, np.full(4, 0.1), True, None, expected)
         found = fallback.step(known)

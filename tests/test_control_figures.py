@@ -10,7 +10,8 @@ import pytest
 from loop_rig import write_scenario
 
 from cosim.control.against_truth import against_truth
-from cosim.control.figures import decisions, fallback_shares
+from cosim.control.damper_map import DamperMap
+from cosim.control.figures import decisions, fallback_figures, fallback_shares
 from cosim.errors import InputError
 from cosim.recorder import Recorder, Signal
 from cosim.run import Outcome, execute
@@ -98,7 +99,7 @@ def test_where_the_truth_gains_nothing_there_is_nothing_to_keep() -> None:
 # ---------------------------------------------------------------- fallback in the loop
 
 
-def driven(folder: Path, fade: float) -> Outcome:
+def driven(folder: Path, fade: float, damper_ms: int = 0) -> Outcome:
     """Skyhook on a linear filter, over a rough road at 50 km/h for 8 s."""
     fallback = f"{{fade_s: {fade}}}"
     controllers = f"[{{kind: skyhook, estimator: fir_residual_w19, fallback: {fallback}}}]"
@@ -106,7 +107,11 @@ def driven(folder: Path, fade: float) -> Outcome:
         folder,
         duration="8",
         surface=CLASS_C,
-        sections={"controllers": controllers, "faults": LOST},
+        sections={
+            "controllers": controllers,
+            "faults": LOST,
+            "latency": f"{{damper_ms: {damper_ms}}}",
+        },
     )
     return execute(load(path), folder / "out")
 
@@ -132,6 +137,12 @@ def test_the_plant_s_damper_force_has_no_step_while_the_command_fades(tmp_path: 
     )
     assert slow < 120.0  # a quarter of the last step that the law made is still in the valve
     assert sudden > 5 * slow
+
+
+def test_with_late_dampers_the_law_s_own_steps_are_not_the_fallback_s(tmp_path: Path) -> None:
+    run = driven(tmp_path, 0.5, damper_ms=100).runs[0]
+    of_the_law = fallback_figures(Fallback(fade_s=0.5), run.recorder, DamperMap())  # 0.1 s before
+    assert run.figures["fallback"]["force_step_n"] < 0.5 * of_the_law["force_step_n"]
 
 
 def test_an_uncertain_estimate_is_not_trusted(tmp_path: Path) -> None:

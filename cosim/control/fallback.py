@@ -89,4 +89,5 @@ class Fallback:
         largest = self._parameters.largest_deviation
         if largest is None or not sample.valid:
             return sample.valid
-        return not max(sample.deviation.tolist()) > largest  # an estimator that predicts none: NaN
+        # NaN, where an estimator predicts none, is not larger than anything
+        return not any(one > largest for one in sample.deviation.tolist())

@@ -12,6 +12,7 @@ from cosim.control.damper_map import DamperMap
 from cosim.control.fallback import Fade
 from cosim.quantities import DAMPER_FORCE, DAMPER_SPEED, VALVE, Quantity
 from cosim.scenario.controllers import Controller, Fallback, Law
+from cosim.scenario.latency import SAMPLE_MS, Latency
 from sensor.metrics.figures import SIGN_THRESHOLD
 
 if TYPE_CHECKING:
@@ -21,15 +22,17 @@ Array = npt.NDArray[np.float64]
 
 
 def control_figures(
-    controller: Controller, recorder: Recorder, dampers: DamperMap
+    controller: Controller, recorder: Recorder, dampers: DamperMap, latency: Latency
 ) -> Mapping[str, Any]:
-    """Return the groups of figures `decisions` and `fallback`, empty where a run has none."""
+    """Return the groups of figures `decisions` and `fallback`, empty where a run has none;
+    `latency` is that of the run.
+    """
     if not isinstance(controller, Law):
         return {"decisions": {}, "fallback": {}}
-    safe = controller.fallback
+    safe, late = controller.fallback, round(latency.damper_ms / SAMPLE_MS)
     return {
         "decisions": decisions(controller, recorder),
-        "fallback": {} if safe is None else fallback_figures(safe, recorder, dampers),
+        "fallback": {} if safe is None else fallback_figures(safe, recorder, dampers, late),
     }
 
 
@@ -49,11 +52,14 @@ def decisions(controller: Law, recorder: Recorder) -> dict[str, float]:
     return {"wrong_percent": 100.0 * float(np.mean(wrong))}
 
 
-def fallback_figures(safe: Fallback, recorder: Recorder, dampers: DamperMap) -> dict[str, float]:
+def fallback_figures(
+    safe: Fallback, recorder: Recorder, dampers: DamperMap, late: int = 0
+) -> dict[str, float]:
     """Return `active_percent`, the share of time without the law alone, `times` it was left after
     having been alone, and `force_step_n`, the largest step of a damper's force that it makes: while
     it fades to the safe command, and where it begins to fade back. From there on the law is heard
-    again, whose own steps are not the fallback's.
+    again, whose own steps are not the fallback's. The dampers have a command `late` samples after
+    it was given.
     """
     shares = fallback_shares(safe, recorder)
     active = shares > 0.0
@@ -63,6 +69,7 @@ def fallback_figures(safe: Fallback, recorder: Recorder, dampers: DamperMap) -> 
     before = np.concatenate([[1.0], shares[:-1]])
     acts = (shares > before) | ((before == 1.0) & (shares < 1.0))
     acts[1:] |= acts[:-1]  # the valve lags behind the command
+    acts = np.concatenate([np.zeros(late, dtype=np.bool_), acts])  # until then the law's commands
     acts = acts[: len(steps)]  # what is commanded at t_k shows from t_k to t_k+1
     if acts.any() and np.isfinite(steps).all():
         found["force_step_n"] = float(np.abs(steps[acts]).max())
