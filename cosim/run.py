@@ -254,6 +254,7 @@ def conclude(
     """
     from cosim.compare import paper_figures
     from cosim.control.against_truth import against_truth
+    from cosim.control.figures import blind
 
     figures = {run.label: run.figures for run in runs}
     ended = [controller for controller in scenario.controllers if controller.label in figures]
@@ -278,7 +279,7 @@ def conclude(
         }
     )
     write_json(output_dir / "metrics.json", metrics)
-    notes = (*notes, *_idle(scenario, runs))
+    notes = (*notes, *_idle(scenario, runs), *blind(ended, records))
     outcome = Outcome(scenario, output_dir, tuple(runs), verdicts, metrics, notes)
     return _report(outcome, versions)
 

@@ -159,6 +159,19 @@ def test_an_uncertain_estimate_is_not_trusted(tmp_path: Path) -> None:
     assert always.figures["fallback"]["active_percent"] < 60.0
 
 
+def test_a_fallback_on_a_deviation_that_nobody_predicts_is_noted(tmp_path: Path) -> None:
+    controllers = (
+        "[{kind: skyhook, estimator: fir_residual_w19, fallback: {largest_deviation_m_s: 0.1}}, "
+        "{kind: skyhook, estimator: fir_residual_w19, name: any, fallback: {}}, "
+        "{kind: skyhook, estimator: kalman, fallback: {largest_deviation_m_s: 0.1}}]"
+    )
+    path = write_scenario(tmp_path, duration="2", sections={"controllers": controllers})
+    assert execute(load(path), tmp_path / "out").notes == (
+        "skyhook_fir_residual_w19: fallback.largest_deviation_m_s never acted: the sensor predicts "
+        "no deviation",
+    )
+
+
 def test_a_fallback_is_for_estimates_alone(tmp_path: Path) -> None:
     wrong = {
         "{kind: skyhook, feedback: truth, fallback: {}}": "the truth is always valid",

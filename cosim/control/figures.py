@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,6 +74,23 @@ def fallback_figures(
     if acts.any() and np.isfinite(steps).all():
         found["force_step_n"] = float(np.abs(steps[acts]).max())
     return found
+
+
+def blind(controllers: Sequence[Controller], records: Mapping[str, Recorder]) -> Iterator[str]:
+    """Yield a sentence for each run whose fallback watches a deviation that is never told;
+    `records` are by the name of the run.
+    """
+    for controller in controllers:
+        safe = controller.fallback if isinstance(controller, Law) else None
+        if safe is None or safe.largest_deviation_m_s is None:
+            continue
+        told = records[controller.label]
+        valid = told.group("valid")[:, 0] > 0
+        if valid.any() and np.isnan(told.group("deviation")[valid]).all():
+            yield (
+                f"{controller.label}: fallback.largest_deviation_m_s never acted: the sensor"
+                " predicts no deviation"
+            )
 
 
 def fallback_shares(safe: Fallback, recorder: Recorder) -> Array:
