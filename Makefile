@@ -114,6 +114,11 @@ faults: $(VENV)/test.stamp ## what faults and latencies do to estimate and ride:
 can: $(VENV)/test.stamp ## the sensor on a CAN bus, its frames and what they cost: docs/can.md (some minutes)
 	$(ONE_THREAD) $(BIN)/python docs/measure/can_bus.py
 
+regression: $(VENV)/test.stamp ## every shipped scenario by its limits and goldens: build/regression/junit.xml, verdicts.txt (some six to ten minutes on two cores)
+	mkdir -p build/regression
+	$(BIN)/cosim test scenarios --junitxml build/regression/junit.xml --output-dir build/regression/results \
+	    2> build/regression/verdicts.txt; code=$$?; cat build/regression/verdicts.txt; exit $$code
+
 manoeuvres: $(VENV)/test.stamp ## how the paper's manoeuvres were driven: docs/paper-scenarios.md (about a minute)
 	$(ONE_THREAD) $(BIN)/python docs/measure/manoeuvres.py
 

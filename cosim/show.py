@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -99,6 +99,8 @@ def outcome(shown: Outcome) -> None:
             f" {factor:.1f} times real time",
             err=True,
         )
+        if "overruns" in figures["timing"]:
+            click.echo(f"{one.label}: {lateness_words(figures['timing'])}", err=True)
         if figures["bus"]:
             click.echo(f"{one.label}: {bus_words(figures['bus'])}", err=True)
     if len(shown.runs) == 1:
@@ -123,6 +125,16 @@ def outcome(shown: Outcome) -> None:
     none = "no limits that count here" if shown.scenario.limits else "no limits set"
     summary = verdict if count else none
     click.echo(f"{summary}; results in {shown.output_dir}", err=True)
+
+
+def lateness_words(timing: Mapping[str, Any]) -> str:
+    """Return how late the samples of a run in real time were, in words."""
+    p50, p99, largest = (timing[f"lateness_{part}_ms"] for part in ("p50", "p99", "max"))
+    overruns = timing["overruns"]
+    return (
+        f"lateness median {p50:.3f} ms, 99 % {p99:.3f} ms, at most {largest:.3f} ms;"
+        f" {overruns} overrun{'' if overruns == 1 else 's'}"
+    )
 
 
 def bus_words(figures: Mapping[str, float]) -> str:
