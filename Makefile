@@ -12,7 +12,7 @@ SEARCH ?= docs/paper/search.json
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 SOURCES := pyproject.toml hatch_build.py $(wildcard fmu/*.py fmu/common/* fmu/vehicle/* fmu/sensor/*)
 
-.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper bounds evaluation robustness closed-loop faults can manoeuvres roads benchmarks benchmark-network embedded sanitize clean study retrain-check
+.PHONY: demo test check fmu cross dataset train search search-full validation evaluated paper bounds evaluation robustness closed-loop faults can regression manoeuvres roads benchmarks benchmark-network embedded sanitize clean study retrain-check
 
 demo: $(VENV)/demo.stamp ## one lap of Hockenheim with the virtual sensor on board
 	$(BIN)/cosim run $(DEMO)
@@ -116,8 +116,9 @@ can: $(VENV)/test.stamp ## the sensor on a CAN bus, its frames and what they cos
 
 regression: $(VENV)/test.stamp ## every shipped scenario by its limits and goldens: build/regression/junit.xml, verdicts.txt (some six to ten minutes on two cores)
 	mkdir -p build/regression
-	$(BIN)/cosim test scenarios --junitxml build/regression/junit.xml --output-dir build/regression/results \
-	    2> build/regression/verdicts.txt; code=$$?; cat build/regression/verdicts.txt; exit $$code
+	{ $(BIN)/cosim test scenarios --junitxml build/regression/junit.xml --output-dir build/regression/results 2>&1; \
+	    echo $$? > build/regression/exit_code; } | tee build/regression/verdicts.txt; \
+	    exit $$(cat build/regression/exit_code)
 
 manoeuvres: $(VENV)/test.stamp ## how the paper's manoeuvres were driven: docs/paper-scenarios.md (about a minute)
 	$(ONE_THREAD) $(BIN)/python docs/measure/manoeuvres.py

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from functools import partial
 from pathlib import Path
 
@@ -56,3 +57,8 @@ def test_a_whole_run_over_another_bench(tmp_path: Path) -> None:
     assert port.calls == [
         "LoadConfiguration", "Configure port.xml", "StartSimulation", "StopSimulation", "Dispose",
     ]  # fmt: skip
+
+
+def test_the_page_shows_the_adapter_that_is_tested() -> None:
+    page = Path(__file__).parents[1] / "docs" / "regression.md"
+    assert f"```python\n{inspect.getsource(XilBench)}```" in page.read_text("utf-8")
