@@ -114,7 +114,7 @@ faults: $(VENV)/test.stamp ## what faults and latencies do to estimate and ride:
 can: $(VENV)/test.stamp ## the sensor on a CAN bus, its frames and what they cost: docs/can.md (some minutes)
 	$(ONE_THREAD) $(BIN)/python docs/measure/can_bus.py
 
-regression: $(VENV)/test.stamp ## every shipped scenario by its limits and goldens: build/regression/junit.xml, verdicts.txt (some six to ten minutes on two cores)
+regression: $(VENV)/test.stamp ## every shipped scenario by its limits and goldens: build/regression/junit.xml, verdicts.txt (about ten minutes on two busy cores)
 	mkdir -p build/regression
 	{ $(BIN)/cosim test scenarios --junitxml build/regression/junit.xml --output-dir build/regression/results 2>&1; \
 	    echo $$? > build/regression/exit_code; } | tee build/regression/verdicts.txt; \
