@@ -174,6 +174,18 @@ def search(recipe: Path, data: Path, out: Path, jobs: int, samples: int, summary
         command.run(recipe, data, out, command.Budget(0 if summary else jobs, samples))
 
 
+def _check_place(source: Path, out: Path) -> None:
+    """Raise `InputError` where no network can be written, or its source would be lost."""
+    from cosim.errors import InputError
+
+    if out.suffix != ".onnx":
+        raise InputError(f"'{out}': the name of a network ends in .onnx")
+    if not out.parent.is_dir():
+        raise InputError(f"'{out}': there is no folder '{out.parent}'")
+    if out.exists() and source.exists() and out.samefile(source):
+        raise InputError(f"'{out}' is the file that is read; give another name")
+
+
 @sensor.command()
 @click.argument("source", type=click.Path(path_type=Path))
 @click.option(
@@ -195,6 +207,7 @@ def export(source: Path, out: Path, streaming: bool) -> None:
     streaming form of a windowed network when it opens the file.
     """
     with failures_as_exit_codes():
+        _check_place(source, out)
         if streaming:
             from sensor.streaming.export import export_streaming
 

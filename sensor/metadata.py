@@ -38,8 +38,8 @@ def read_metadata(text: str | None, source: str) -> ModelInfo:
         carried = metadata.get("kind") == CARRIED
         window = 1 if carried else int(metadata["window"])
         info = ModelInfo("carried" if carried else "windowed", window, rate, metadata)
-        named = [(part["names"], part["units"]) for part in (inputs, outputs)]
-    except (ValueError, KeyError, TypeError) as error:
+        named = [(list(part["names"]), list(part["units"])) for part in (inputs, outputs)]
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise SensorError(f"{source}: its metadata lacks or misspells {error}.") from error
     check_channels(f"{source}, inputs", *named[0], CHANNELS)
     check_channels(f"{source}, outputs", *named[1], OUTPUTS)

@@ -129,6 +129,24 @@ def test_it_needs_neither_torch_nor_the_onnx_package(model: Path, tmp_path: Path
     assert float(said.stdout) < 1e-5
 
 
+def test_a_network_for_one_window_at_a_time_packs(model: Path, tmp_path: Path) -> None:
+    """What torch's exporters write unless they are told that the batch is open."""
+    changed = onnx.load(model)
+    for port in (*changed.graph.input, *changed.graph.output):
+        port.type.tensor_type.shape.dim[0].dim_value = 1
+    onnx.save(changed, tmp_path / "one.onnx")
+    assert pack(tmp_path / "one.onnx", tmp_path / "sensor.fmu").difference < 1e-5
+
+
+def test_a_shape_that_does_not_fit_is_named_with_the_file(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sensor.packed.layout.MOST", 11)
+    result = typed_in(model, "-o", tmp_path / "s.fmu")
+    assert result.exit_code == 2
+    assert f"{model}: it has 19 samples in a window, 12 units, " in result.stderr
+
+
 def test_the_result_is_checked_before_it_is_written(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from packed_sensor import (
 from sensor.channels import CHANNEL_NAMES, CHANNEL_UNITS, OUTPUT_NAMES, OUTPUT_UNITS
 from sensor.errors import SensorError
 from sensor.packed import blob, read_network
+from sensor.packed.layout import MOST
 from sensor.runtime import OnnxSensor
 
 WINDOW, UNITS, HIDDEN = 6, 5, 7
@@ -267,6 +269,77 @@ def test_another_windowed_network_is_refused(
 ) -> None:
     with pytest.raises(SensorError, match=said):
         read_network(edited(windowed, tmp_path, edit))
+
+
+def without_recurrent_weights(model: onnx.ModelProto) -> None:
+    lstm = next(node for node in model.graph.node if node.op_type == "LSTM")
+    lstm.input[2] = ""
+
+
+def without_an_input(model: onnx.ModelProto) -> None:
+    next(node for node in model.graph.node if node.op_type == "Relu").input[0] = ""
+
+
+def without_an_output(model: onnx.ModelProto) -> None:
+    del next(node for node in model.graph.node if node.op_type == "LSTM").output[:]
+
+
+def in_no_direction(model: onnx.ModelProto) -> None:
+    lstm = next(node for node in model.graph.node if node.op_type == "LSTM")
+    lstm.attribute.append(helper.make_attribute("direction", "sideways"))
+
+
+def within_a_number(model: onnx.ModelProto) -> None:
+    weight = next(w for w in model.graph.initializer if w.name == "dense_W")
+    weight.raw_data = weight.raw_data[:-1]
+
+
+def without_a_depth(model: onnx.ModelProto) -> None:
+    line = next(port for port in model.graph.input if port.name == "line")
+    line.type.tensor_type.ClearField("shape")
+
+
+def saying(key: str, value: object) -> Callable[[onnx.ModelProto], None]:
+    def edit(model: onnx.ModelProto) -> None:
+        entry = next(p for p in model.metadata_props if p.key == "sensor")
+        entry.value = json.dumps({**json.loads(entry.value), key: value})
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("kind", "edit", "said"),
+    [
+        ("windowed", without_recurrent_weights, "operator LSTM .*has no weights of three"),
+        ("windowed", without_an_input, "operator Relu .*has no input"),
+        ("windowed", without_an_output, "operator LSTM .*has no output"),
+        ("windowed", in_no_direction, "operator LSTM .*with direction 'sideways'"),
+        ("windowed", within_a_number, "constant 'dense_W' ends within a number"),
+        ("carried", without_a_depth, r"'line' is \[\], where \[depth, signals\]"),
+        ("windowed", saying("window", float("inf")), "misspells cannot convert float infinity"),
+        ("carried", saying("inputs", {"names": 3, "units": 4}), "misspells 'int' object"),
+    ],
+)
+def test_a_damaged_network_is_refused(
+    kind: str,
+    edit: Callable[[onnx.ModelProto], object],
+    said: str,
+    tmp_path: Path,
+    request: pytest.FixtureRequest,
+) -> None:
+    with pytest.raises(SensorError, match=said):
+        read_network(edited(request.getfixturevalue(kind), tmp_path, edit))
+
+
+def test_a_shape_beyond_the_c_sensors_is_named(library, windowed: Path, carried: Path) -> None:  # type: ignore[no-untyped-def]
+    """The limits are the C sensor's own: it takes what is at them."""
+    network = read_network(windowed)
+    PackedSensor(library, blob(replace(network, window=MOST)))
+    with pytest.raises(SensorError, match="4097 samples in a window, where at most 4096 are"):
+        blob(replace(network, window=MOST + 1))
+    network = read_network(carried)
+    with pytest.raises(SensorError, match="5000 samples of the delay line, where at most 4096"):
+        blob(replace(network, arrays={**network.arrays, "depth": np.array(5000)}))
 
 
 def test_what_is_no_onnx_file_is_refused(tmp_path: Path) -> None:

@@ -225,7 +225,7 @@ def test_the_template_says_that_it_has_no_network() -> None:
     template = fmus.Shipped("vehicle", 3).path.with_name("sensor.fmi3.fmu")
     with pytest.raises(FmuError) as caught:
         FmuSensor(template)
-    assert "network.bin: it cannot be opened" in str(caught.value)
+    assert "network.bin: It cannot be opened. `cosim" in str(caught.value)
     assert "`cosim pack` puts a network into" in str(caught.value)
 
 

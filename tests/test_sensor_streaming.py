@@ -3,6 +3,7 @@ after a reset, around a NaN.
 """
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,9 +14,11 @@ import numpy.typing as npt
 import onnx
 import pytest
 import torch
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cosim.cli import main
 from sensor.errors import SensorError
 from sensor.estimators import MODELS
 from sensor.export import export_windowed
@@ -191,6 +194,26 @@ def test_the_file_for_other_tools_streams_with_plain_copies(
         cell[1:-1] = cells[: rows - 2]
         if k >= 6:
             np.testing.assert_allclose(estimate[0], expected[k], rtol=0, atol=TOLERANCE)
+
+
+def test_a_network_is_not_written_over_itself_nor_over_a_device(
+    small: tuple[BiLstmNetwork, Path], tmp_path: Path
+) -> None:
+    model, pipe = tmp_path / "windowed.onnx", tmp_path / "null"
+    model.write_bytes(small[1].read_bytes())
+    os.mkfifo(pipe)
+    for out, words in (
+        (model, "is the file that is read"),
+        (pipe, "the name of a network ends in .onnx"),
+        (tmp_path / "none" / "a.onnx", "there is no folder"),
+    ):
+        done = CliRunner().invoke(
+            main, ["sensor", "export", str(model), "-o", str(out), "--streaming"]
+        )
+        assert done.exit_code == 2
+        assert words in done.output
+    assert model.read_bytes() == small[1].read_bytes()
+    assert pipe.is_fifo()
 
 
 def test_a_streaming_file_in_a_windowed_ones_place_is_named(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -245,6 +246,16 @@ def test_what_an_ssp_cannot_hold(
         assert word in done.output
     assert "Traceback" not in done.output
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_no_packages(bumps: Exported, tmp_path: Path) -> None:
+    """Nothing is put in the place of a file of another kind, or of a device."""
+    out = tmp_path / "null"
+    os.mkfifo(out)
+    done = CliRunner().invoke(main, ["export-ssp", str(bumps.scenario), "-o", str(out)])
+    assert done.exit_code == 2
+    assert "the name of a package ends in .ssp" in done.output
+    assert out.is_fifo()
 
 
 def test_a_folder_that_is_not_there(bumps: Exported, tmp_path: Path) -> None:

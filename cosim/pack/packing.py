@@ -18,6 +18,7 @@ from cosim.pack.template import DESCRIPTION, NETWORK, read_template, token_of
 from cosim.pack.trial import compare
 from cosim.sensor_fmu import DEVIATIONS
 from sensor.channels import COMMANDS
+from sensor.errors import SensorError
 from sensor.packed import blob, read_network
 
 
@@ -45,7 +46,10 @@ def pack(model: Path, out: Path, fmi: int = 3, platforms: Sequence[str] = ()) ->
     template = read_template(fmi)
     others = binaries(template, platforms)
     network = read_network(model)
-    packed = blob(network)
+    try:
+        packed = blob(network)
+    except SensorError as error:
+        raise SensorError(f"{model}: {error}") from error
     absent = frozenset() if network.kind == "carried" else _of_carried_networks()
     identity = Identity(
         f"Sensor {model.stem}", sentence(model.name, network), token_of(template, packed), absent

@@ -74,8 +74,12 @@ def _expected(network: Path, window: int, channels: Array, commands: Array) -> A
         return np.array(CarriedSensor(network).apply_with_deviation(channels, commands))
     session = open_session(network)
     samples = channels.astype(np.float32)
-    windows = np.lib.stride_tricks.sliding_window_view(samples, window, axis=0)[::EVERY]
-    batch = np.ascontiguousarray(windows.transpose(0, 2, 1))
     estimates = np.full((2, len(channels), 4), np.nan)
-    estimates[0, window - 1 :: EVERY] = session.run(None, {session.get_inputs()[0].name: batch})[0]
+    name = session.get_inputs()[0].name
+    try:  # window by window: many exporters write a batch of one
+        for last in range(window - 1, len(samples), EVERY):
+            one = samples[np.newaxis, last - window + 1 : last + 1]
+            estimates[0, last] = session.run(None, {name: one})[0]
+    except Exception as error:  # ONNX Runtime's exceptions share no public base class
+        raise NetworkError(f"{network}: ONNX Runtime cannot run it: {error}") from error
     return estimates

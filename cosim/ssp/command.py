@@ -19,10 +19,9 @@ def run(
     scenario: str, out: Path, controller: str | None, overrides: Sequence[tuple[str, str]]
 ) -> None:
     """Write the package and say what is in it. Raises what `export` raises."""
+    _check_place(out)
     settings = load_labelled(scenario, overrides)
     chosen = _controller(settings, controller)
-    if not out.parent.is_dir():
-        raise InputError(f"'{out}': there is no folder '{out.parent}'")
     with show.progress() as progress:
 
         def tell(done: int, total: int) -> None:
@@ -31,8 +30,13 @@ def run(
 
         package = export(settings, chosen, tell)
     part = out.with_name(f".{out.name}.part")
-    part.write_bytes(package.content)
-    part.replace(out)
+    try:
+        part.write_bytes(package.content)
+        part.replace(out)
+    except OSError as error:
+        raise InputError(f"cannot write '{out}': {error.strerror or error}") from None
+    finally:
+        part.unlink(missing_ok=True)
     parts, wires = package.structure.components, package.structure.connections
     print(
         f"{out}: {' and '.join(part.name for part in parts)}, {len(wires)} connections, "
@@ -41,6 +45,14 @@ def run(
         f"estimates are in it too.",
         file=sys.stderr,
     )
+
+
+def _check_place(out: Path) -> None:
+    """Raise `InputError` where no package can be written, before there is any work."""
+    if out.suffix != ".ssp":
+        raise InputError(f"'{out}': the name of a package ends in .ssp")
+    if not out.parent.is_dir():
+        raise InputError(f"'{out}': there is no folder '{out.parent}'")
 
 
 def _controller(scenario: Scenario, label: str | None) -> Controller:

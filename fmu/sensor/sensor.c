@@ -21,7 +21,7 @@ static void *network_state(const Model *m) { return (char *)m->state + NETWORK_S
 static ModelStatus refuse_file(const Model *m, const char *why)
 {
     model_log(m, MODEL_ERROR, "logStatusError",
-              "The sensor cannot be instantiated: %s/%s: %s. `cosim pack` puts a network into the FMU's resources.",
+              "The sensor cannot be instantiated: %s/%s: %s `cosim pack` puts a network into the FMU's resources.",
               m->resources, network_file, why);
     return MODEL_ERROR;
 }
@@ -44,7 +44,7 @@ static ModelStatus load(Model *m, Sensor *sensor)
     size_t size = 0;
 
     if ((size_t)snprintf(path, sizeof path, "%s/%s", m->resources, network_file) >= sizeof path)
-        return refuse_file(m, "the path is too long");
+        return refuse_file(m, "The path is too long.");
     sensor->blob = read_blob(path, &size, &sensor->blob_memory, &why);
     if (!sensor->blob)
         return refuse_file(m, why);
@@ -53,7 +53,7 @@ static ModelStatus load(Model *m, Sensor *sensor)
         return refuse_file(m, why);
     sensor->scratch = aligned_room(network_scratch_bytes(&sensor->network), &sensor->scratch_memory);
     if (!sensor->scratch)
-        return refuse_file(m, "memory is short");
+        return refuse_file(m, "Memory is short.");
     m->state_size = NETWORK_STATE_AT + network_state_bytes(&sensor->network);
     identify(m, sensor->blob);
     return MODEL_OK;
@@ -62,7 +62,7 @@ static ModelStatus load(Model *m, Sensor *sensor)
 ModelStatus model_load(Model *m)
 {
     m->derived = calloc(1, sizeof(Sensor));
-    return m->derived ? load(m, m->derived) : refuse_file(m, "memory is short");
+    return m->derived ? load(m, m->derived) : refuse_file(m, "Memory is short.");
 }
 
 ModelStatus model_prepare(Model *m)

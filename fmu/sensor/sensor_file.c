@@ -31,17 +31,17 @@ void *read_blob(const char *path, size_t *size, void **memory, const char **why)
     long length = -1;
 
     *memory = NULL;
-    *why = "it cannot be opened";
+    *why = "It cannot be opened.";
     if (!file)
         return NULL;
     if (fseek(file, 0, SEEK_END) == 0)
         length = ftell(file);
-    *why = "it cannot be read";
+    *why = "It cannot be read.";
     if (length >= 0 && fseek(file, 0, SEEK_SET) == 0) {
-        *why = "memory is short";
+        *why = "Memory is short.";
         blob = aligned_room((size_t)length, memory);
         if (blob && fread(blob, 1, (size_t)length, file) != (size_t)length) {
-            *why = "it cannot be read";
+            *why = "It cannot be read.";
             blob = NULL;
         }
     }

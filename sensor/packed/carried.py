@@ -41,10 +41,18 @@ def arrays(graph: Graph) -> dict[str, Array]:
                 f"constant {pattern.found[name]!r} is {_short(found[name])}, where {_short(value)}"
                 " belongs."
             )
-    depth = next(port.shape[0] for port in graph.inputs if port.name == "line")
+    depth = _depth(graph)
     result = {**found, "depth": np.array(depth)}
     _check_shapes(result)
     return result
+
+
+def _depth(graph: Graph) -> int:
+    """Return the samples in the delay line, (depth, signals)."""
+    shape = next(port.shape for port in graph.inputs if port.name == "line")
+    if not shape or not isinstance(shape[0], int):
+        raise SensorError(f"its input 'line' is {list(shape)}, where [depth, signals] belongs.")
+    return shape[0]
 
 
 def _check_ports(graph: Graph) -> None:

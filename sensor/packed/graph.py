@@ -46,6 +46,8 @@ def graph_of(model: Model) -> Graph:
     for node in model.nodes:
         if node.domain not in ("", "ai.onnx"):
             raise SensorError(f"operator {node.domain}.{node.kind} is not supported.")
+        if not node.outputs:
+            raise SensorError(f"{described(node)} has no output.")
     constants = {name: array_of(tensor) for name, tensor in model.tensors.items()}
     nodes = []
     for node in model.nodes:

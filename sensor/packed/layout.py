@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from sensor.errors import SensorError
 from sensor.packed.network import PackedNetwork
 
 Array = npt.NDArray[Any]
@@ -24,6 +25,7 @@ VERSION: Final = 1
 ALIGNMENT: Final = 64
 BLOCK: Final = 64
 UNITS: Final = 16
+MOST: Final = 4096  # units or samples: MOST_UNITS, MOST_SAMPLES of fmu/sensor/packed.c
 HALF: Final = 8
 _FLOATS: Final = (
     *("residual_least", "residual_most", "slip_least", "slip_most", "least_speed", "least_energy"),
@@ -38,7 +40,8 @@ _GATES: Final = [0, 2, 3, 1]  # ONNX's input, output, forget, cell -> input, for
 
 
 def blob(network: PackedNetwork) -> bytes:
-    """Return the packed network."""
+    """Return the packed network. Raises SensorError naming what is too large for the C sensor."""
+    _check_shape(network)
     sections = _windowed(network) if network.kind == "windowed" else _carried(network)
     content = b"".join(_filled(section) for section in sections)
     carried = network.kind == "carried"
@@ -50,6 +53,16 @@ def blob(network: PackedNetwork) -> bytes:
     )
     size, checksum = ALIGNMENT + len(content), zlib.crc32(content, zlib.crc32(rest))
     return struct.pack("<8s4I", MAGIC, BYTE_ORDER, VERSION, size, checksum) + rest + content
+
+
+def _check_shape(network: PackedNetwork) -> None:
+    shape = {"samples in a window": network.window, "units": network.units}
+    shape |= {"hidden units": network.hidden, "units before the LSTM": network.front}
+    shape |= {"moments of the delay line": network.leads}
+    shape |= {"samples of the delay line": int(network.arrays.get("depth", 0))}
+    beyond = [f"{value} {name}" for name, value in shape.items() if value > MOST]
+    if beyond:
+        raise SensorError(f"it has {', '.join(beyond)}, where at most {MOST} are supported.")
 
 
 def _warm_up(network: PackedNetwork) -> int:

@@ -15,6 +15,8 @@ from sensor.packed.standardisation import take_standardisation
 Array = npt.NDArray[Any]
 
 _ACTIVATIONS: Final = ("Sigmoid", "Tanh", "Tanh")
+_WEIGHTS_NDIM: Final = 3  # (directions, 4 units, inputs)
+_DIRECTIONS: Final = {"forward": [0], "reverse": [1], "bidirectional": [0, 1]}
 _KEEP: Final = [0, 3, 1]  # the backward cell: input, cell and output gate, nothing to forget
 
 
@@ -38,6 +40,8 @@ class Lstm:
                 " supported."
             )
         self._check_input(node, x)
+        if not all(isinstance(part, np.ndarray) and part.ndim == _WEIGHTS_NDIM for part in (w, r)):
+            raise SensorError(f"{described(node)} has no weights of three dimensions.")
         units = r.shape[2]
         for place, direction in enumerate(directions):
             self._take(
@@ -48,7 +52,9 @@ class Lstm:
     def _directions(self, node: Node) -> list[int]:
         given = attributes("LSTM", node.attributes)
         direction = given.pop("direction", "forward")
-        directions = {"forward": [0], "reverse": [1], "bidirectional": [0, 1]}[direction]
+        if direction not in _DIRECTIONS:
+            raise SensorError(f"{described(node)} with direction {direction!r} is not supported.")
+        directions = _DIRECTIONS[direction]
         activations = tuple(given.pop("activations", ()))
         if activations not in ((), _ACTIVATIONS * len(directions)):
             raise SensorError(

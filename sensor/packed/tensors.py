@@ -29,6 +29,8 @@ def array_of(tensor: Tensor) -> npt.NDArray[Any]:
         )
     if tensor.numbers:
         flat: npt.NDArray[Any] = np.array(tensor.numbers, dtype=kind)
+    elif len(tensor.raw) % np.dtype(kind).itemsize:
+        raise SensorError(f"constant {tensor.name!r} ends within a number.")
     else:
         flat = np.frombuffer(tensor.raw, dtype=np.dtype(kind).newbyteorder("<")).astype(kind)
     if flat.size != np.prod(tensor.shape, dtype=np.int64):

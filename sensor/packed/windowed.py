@@ -53,6 +53,8 @@ class WindowedWalk:
         for node in self._graph.nodes:
             if skipped.intersection(node.outputs):
                 continue
+            if not node.inputs or not node.inputs[0]:
+                raise SensorError(f"{described(node)} has no input.")
             values = [self._values.get(name) if name else None for name in node.inputs]
             for name, value in zip(node.inputs, values, strict=True):
                 if name and value is None:
