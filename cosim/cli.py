@@ -281,6 +281,11 @@ def compare(runs: tuple[Path, ...], output: Path, as_json: bool) -> None:
     help="Whose damper commands are recorded; the scenario's first by default.",
 )
 @click.option(
+    "--components-only",
+    is_flag=True,
+    help="No connectors of the system as a whole, which libcosim and Ecos cannot read.",
+)
+@click.option(
     "--set",
     "overrides",
     metavar="KEY=VALUE",
@@ -288,7 +293,11 @@ def compare(runs: tuple[Path, ...], output: Path, as_json: bool) -> None:
     help="Override a field of the scenario; may be repeated.",
 )
 def export_ssp(
-    scenario: str, out: Path, controller: str | None, overrides: tuple[str, ...]
+    scenario: str,
+    out: Path,
+    controller: str | None,
+    components_only: bool,
+    overrides: tuple[str, ...],
 ) -> None:
     """Write the wiring of SCENARIO as an SSP 1.0 package: vehicle and sensor FMU, their start
     values and connections.
@@ -300,7 +309,8 @@ def export_ssp(
     with failures_as_exit_codes():
         from cosim.ssp.command import run as run_export
 
-        run_export(scenario, out, controller, [(text, f"--set {text}") for text in overrides])
+        settings = [(text, f"--set {text}") for text in overrides]
+        run_export(scenario, out, controller, settings, components_only)
 
 
 def _run_one(

@@ -6,9 +6,11 @@ ways to end than an exception.
 
 from __future__ import annotations
 
+import io
 import platform
 import shutil
 import sys
+import zipfile
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -20,6 +22,7 @@ import fmpy
 import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
+from fmpy.ssp.ssd import read_ssv
 
 Rows = list[list[float]]
 
@@ -54,6 +57,20 @@ class Pair:
     outputs: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Ssp:
+    """A package of a vehicle and a sensor, as a file and unpacked: what the vehicle is set to step
+    by step, and what to read of the sensor.
+    """
+
+    file: Path
+    folder: Path
+    step_size: float  # s
+    inputs: tuple[str, ...]
+    commands: Rows  # one row to each step
+    outputs: tuple[str, ...]
+
+
 def available(master: str) -> None:
     """Skip where the master cannot be installed; fail where it only has not been."""
     if (sys.platform, platform.machine()) != ("linux", "x86_64"):
@@ -82,6 +99,14 @@ def run_pair(master: str, pair: Pair) -> Rows:
     runner = {"libcosimpy": libcosim_pair, "ecospy": ecos_pair}[master]
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(runner, pair).result()
+
+
+def run_ssp(master: str, ssp: Ssp) -> Rows:
+    """Outputs of the package's sensor after each step."""
+    available(master)
+    runner = {"libcosimpy": libcosim_ssp, "ecospy": ecos_ssp}[master]
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(runner, ssp).result()
 
 
 def libcosim(task: Task) -> Rows:
@@ -206,6 +231,49 @@ def ecos_pair(pair: Pair) -> Rows:
                 rows.append([simulation.get_real(f"sensor::{name}") for name in pair.outputs])
             simulation.terminate()
     parameters.free()
+    return rows
+
+
+def libcosim_ssp(ssp: Ssp) -> Rows:
+    """A package in libcosim, which reads an unpacked one."""
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+
+    log_output_level(CosimLogLevel.ERROR)
+    execution = CosimExecution.from_ssp_file(str(ssp.folder), ssp.step_size * 1e9)
+    car, sensor = map(execution.slave_index_from_instance_name, ("vehicle", "sensor"))
+    of_car, of_sensor = (
+        references(ssp.folder / f"resources/{n}.fmu") for n in ("vehicle", "sensor")
+    )
+    manipulator, observer = CosimManipulator.create_override(), CosimObserver.create_last_value()
+    execution.add_manipulator(manipulator)
+    execution.add_observer(observer)
+    inputs, outputs = [of_car[n] for n in ssp.inputs], [of_sensor[n] for n in ssp.outputs]
+    rows = []
+    for command in ssp.commands:
+        assert manipulator.slave_real_values(car, inputs, command)
+        assert execution.step()
+        rows.append([float(value) for value in observer.last_real_values(sensor, outputs)])
+    return rows
+
+
+def ecos_ssp(ssp: Ssp) -> Rows:
+    """A package in Ecos."""
+    from ecospy.EcosSimulation import EcosSimulation
+
+    rows = []
+    with zipfile.ZipFile(ssp.file) as archive:
+        name = read_ssv(io.BytesIO(archive.read("resources/parameters.ssv"))).name
+    with EcosSimulation(ssp_path=str(ssp.file), step_size=ssp.step_size) as simulation:
+        assert simulation.init(parameter_set=name)
+        for command in ssp.commands:
+            for variable, value in zip(ssp.inputs, command, strict=True):
+                simulation.set_real(f"vehicle::{variable}", value)
+            simulation.step(1)
+            rows.append([simulation.get_real(f"sensor::{n}") for n in ssp.outputs])
+        simulation.terminate()
     return rows
 
 

@@ -18,6 +18,7 @@ from click.testing import CliRunner
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import SystemStructureDescription, read_ssd, read_ssv
 from foreign_fmu import own_variables, parrot, report
+from foreign_masters import Ssp, run_ssp
 from loop_rig import write_scenario
 
 from cosim.assembly import assemble
@@ -168,9 +169,11 @@ def test_fmpys_master_gives_the_direct_runs_estimates(bumps: Exported) -> None:
     commands = bumps.recorded()[1][:, 1:8]
     steps = len(commands) - 1
     with zipfile.ZipFile(bumps.package) as archive:
-        values = io.BytesIO(archive.read("resources/parameters.ssv"))
+        values = read_ssv(io.BytesIO(archive.read("resources/parameters.ssv")))
+    for parameter in values.parameters:
+        parameter.name = f"vehicle.{parameter.name}"
     rows = simulate_ssp(
-        str(bumps.package), 0.0, (steps - 0.5) * H, H, parameter_set=read_ssv(values),
+        str(bumps.package), 0.0, (steps - 0.5) * H, H, parameter_set=values,
         input={name: late(commands, i) for i, name in enumerate(INPUTS)},
     )  # fmt: skip
     channels, estimates = as_fmpy_drives(bumps, commands)
@@ -183,6 +186,25 @@ def test_fmpys_master_gives_the_direct_runs_estimates(bumps: Exported) -> None:
     np.testing.assert_allclose(streamed[18:], estimates[18:steps], rtol=0, atol=1e-5)
     direct = bumps.recorded()[1][:, 8:12]
     assert np.abs(streamed[19:] - direct[19:steps]).max() < 0.01  # one step without pedals
+
+
+@pytest.mark.parametrize("master", ["libcosimpy", "ecospy"])
+def test_other_masters_give_the_direct_runs_estimates(
+    bumps: Exported, tmp_path: Path, master: str
+) -> None:
+    """Structure, start values and road, read by libcosim from a folder and by Ecos as a file; a
+    step's end has the estimate of the sample at its beginning.
+    """
+    package = export(bumps.scenario, tmp_path / "b.ssp", "--components-only")
+    with zipfile.ZipFile(package.package) as archive:
+        archive.extractall(tmp_path / "b")
+    recorded = package.recorded()[1]
+    ssp = Ssp(package.package, tmp_path / "b", H, tuple(INPUTS), recorded[:-1, 1:8].tolist(),
+              tuple(o.name for o in OUTPUTS))  # fmt: skip
+    rows = np.array(run_ssp(master, ssp))
+    direct = recorded[:-1, 8:12]
+    assert np.ptp(direct[18:]) > 0.1  # m/s: the bumps were there
+    np.testing.assert_allclose(rows[18:], direct[18:], rtol=0, atol=1e-5)
 
 
 def test_the_road_is_in_the_vehicle(bumps: Exported, tmp_path: Path) -> None:

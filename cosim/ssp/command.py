@@ -16,7 +16,11 @@ from cosim.ssp.export import export
 
 
 def run(
-    scenario: str, out: Path, controller: str | None, overrides: Sequence[tuple[str, str]]
+    scenario: str,
+    out: Path,
+    controller: str | None,
+    overrides: Sequence[tuple[str, str]],
+    components_only: bool = False,
 ) -> None:
     """Write the package and say what is in it. Raises what `export` raises."""
     _check_place(out)
@@ -28,7 +32,7 @@ def run(
             if progress is not None:
                 progress(chosen.label, done, total)
 
-        package = export(settings, chosen, tell)
+        package = export(settings, chosen, tell, components_only)
     part = out.with_name(f".{out.name}.part")
     try:
         part.write_bytes(package.content)

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from cosim.ssp.structure import Component, Connection, Connector, Structure
+from cosim.ssp.structure import VEHICLE, Component, Connection, Connector, Structure
 
 VERSION: Final = "1.0"
 SYSTEM_NAME: Final = "test_bench"  # some masters take identifiers only
@@ -28,9 +28,8 @@ def system_structure(structure: Structure, stop_s: float) -> bytes:
     root = _root("ssd", "SystemStructureDescription", structure.name, ("ssd", "ssc"))
     root.set("description", structure.description)
     system = _add(root, "ssd:System", name=SYSTEM_NAME)
-    _connectors(system, structure.connectors)
-    bindings = _add(system, "ssd:ParameterBindings")
-    _add(bindings, "ssd:ParameterBinding", source=PARAMETERS)
+    if structure.connectors:
+        _connectors(system, structure.connectors)
     elements = _add(system, "ssd:Elements")
     for component in structure.components:
         _component(elements, component)
@@ -47,7 +46,7 @@ def system_structure(structure: Structure, stop_s: float) -> bytes:
 def parameter_values(
     name: str, values: Mapping[str, bool | float | str], unit_of: Mapping[str, str], units: Units
 ) -> bytes:
-    """Return the parameter values as SSV, `unit_of` giving the units of those that have one."""
+    """Return one component's parameter values as SSV, in the units of `unit_of` if any."""
     root = _root("ssv", "ParameterSet", name, ("ssv", "ssc"))
     parameters = _add(root, "ssv:Parameters")
     for parameter, value in values.items():
@@ -81,6 +80,9 @@ def _component(elements: Any, component: Component) -> None:
         implementation="CoSimulation",
     )
     _connectors(element, component.connectors)
+    if component.name == VEHICLE:  # at the component, where every master looks for them
+        bindings = _add(element, "ssd:ParameterBindings")
+        _add(bindings, "ssd:ParameterBinding", source=PARAMETERS)
 
 
 def _connectors(parent: Any, connectors: Iterable[Connector]) -> None:

@@ -42,8 +42,10 @@ def export(
     scenario: Scenario,
     controller: Controller,
     progress: Callable[[int, int], None] | None = None,
+    components_only: bool = False,
 ) -> Package:
-    """Run the scenario with one of its controllers and return the package.
+    """Run the scenario with one of its controllers and return the package, if asked so without the
+    system's own connectors.
 
     Raises `InputError` with everything wrong in the scenario or beyond what an SSP can hold,
     `FmuError` or `NetworkError` for a file that does not load, and what a run raises.
@@ -60,6 +62,8 @@ def export(
             scenario.name, scenario.description, wiring, vehicle, Description(fmu)
         )
         sensor_content = fmu.read_bytes()
+    if components_only:
+        structure = structure.components_only()
     road = course.file.read_bytes() if ROAD_FILE in values else None
     content = vehicle.path.read_bytes()
     if road is not None:
@@ -135,9 +139,8 @@ def _values(
 ) -> bytes:
     """Return the values that are not the FMU's own start values, as SSV."""
     changed = {key: v for key, v in values.items() if not _is_start(vehicle.variables[key], v)}
-    units = {f"{VEHICLE}.{key}": u for key in changed if (u := vehicle.unit_of(key)) is not None}
-    named = {f"{VEHICLE}.{key}": value for key, value in changed.items()}
-    return parameter_values(name, named, units, structure.units)
+    units = {key: u for key in changed if (u := vehicle.unit_of(key)) is not None}
+    return parameter_values(name, changed, units, structure.units)
 
 
 def _is_start(variable: object, value: Value) -> bool:

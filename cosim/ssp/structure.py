@@ -7,7 +7,7 @@ enters the system through its own inputs, which whoever runs it has to feed.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from cosim.fmi import KINDS, Description
@@ -63,6 +63,11 @@ class Structure:
     components: tuple[Component, ...]
     connections: tuple[Connection, ...]
     units: Mapping[str, Mapping[str, float]]
+
+    def components_only(self) -> Structure:
+        """Return the system without connectors of its own, and what is connected to them."""
+        inner = (c for c in self.connections if SYSTEM not in (c.source[0], c.target[0]))
+        return replace(self, connectors=(), connections=tuple(inner))
 
 
 def structure_of(
