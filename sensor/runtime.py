@@ -103,7 +103,7 @@ def session_of(model: str | bytes) -> ort.InferenceSession:
     """Return a session on one thread of a file or of its content."""
     options = ort.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 3
+    options.log_severity_level = 4  # what is wrong is in its exceptions too
     return ort.InferenceSession(model, options, providers=["CPUExecutionProvider"])
 
 

@@ -138,6 +138,19 @@ def test_a_network_for_one_window_at_a_time_packs(model: Path, tmp_path: Path) -
     assert pack(tmp_path / "one.onnx", tmp_path / "sensor.fmu").difference < 1e-5
 
 
+def test_a_network_that_does_not_run_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    """Its operators are this sensor's, but a state has not the shape that its port has."""
+    changed = onnx.load(fmus.small_network(carried=True))
+    for port in (*changed.graph.input, *changed.graph.output):
+        if port.name in ("hidden", "next_hidden"):
+            port.type.tensor_type.shape.dim[2].dim_value = 2
+    onnx.save(changed, tmp_path / "odd.onnx")
+    result = typed_in(tmp_path / "odd.onnx", "-o", tmp_path / "s.fmu")
+    assert result.exit_code in (2, 3), result.output
+    assert f"{tmp_path / 'odd.onnx'}: ONNX Runtime cannot " in result.stderr
+    assert not (tmp_path / "s.fmu").exists()
+
+
 def test_a_shape_that_does_not_fit_is_named_with_the_file(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -331,6 +331,15 @@ def test_a_damaged_network_is_refused(
         read_network(edited(request.getfixturevalue(kind), tmp_path, edit))
 
 
+def test_a_damaged_network_is_one_sentence_at_run_time(
+    windowed: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """ONNX Runtime's own lines do not come before it."""
+    with pytest.raises(SensorError, match="ONNX Runtime cannot read it as a network"):
+        OnnxSensor(edited(windowed, tmp_path, in_no_direction))
+    assert capfd.readouterr().err == ""
+
+
 def test_a_shape_beyond_the_c_sensors_is_named(library, windowed: Path, carried: Path) -> None:  # type: ignore[no-untyped-def]
     """The limits are the C sensor's own: it takes what is at them."""
     network = read_network(windowed)

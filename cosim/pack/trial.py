@@ -11,6 +11,7 @@ import numpy.typing as npt
 from cosim.errors import NetworkError
 from cosim.sensor_fmu import FmuSensor
 from sensor.channels import CHANNELS, COMMANDS
+from sensor.errors import SensorError
 
 Array = npt.NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def compare(fmu: Path, network: Path, window: int) -> float:
     counts = np.isfinite(found[0]).all(axis=1)
     if not np.array_equal(counts, np.arange(len(counts)) >= first):
         raise NetworkError(f"{network}: packed, it has estimates at other samples than before")
-    expected = _expected(network, window, channels, commands)
+    expected = _answers(network, window, channels, commands)
     largest = float(np.nanmax(np.abs(found - expected)))
     if not largest <= TOLERANCE:
         raise NetworkError(
@@ -63,6 +64,16 @@ def _samples(count: int) -> tuple[Array, Array]:
     return _MEAN + _SPREAD * smooth, commands
 
 
+def _answers(network: Path, window: int, channels: Array, commands: Array) -> Array:
+    """Return what `_expected` does; raises `NetworkError` if the network does not run."""
+    try:
+        return _expected(network, window, channels, commands)
+    except SensorError:
+        raise
+    except Exception as error:  # ONNX Runtime's exceptions share no public base class
+        raise NetworkError(f"{network}: ONNX Runtime cannot run it: {error}") from error
+
+
 def _expected(network: Path, window: int, channels: Array, commands: Array) -> Array:
     """Return the network's own estimates and deviations (2, count, 4), NaN where they are not asked
     for.
@@ -76,10 +87,7 @@ def _expected(network: Path, window: int, channels: Array, commands: Array) -> A
     samples = channels.astype(np.float32)
     estimates = np.full((2, len(channels), 4), np.nan)
     name = session.get_inputs()[0].name
-    try:  # window by window: many exporters write a batch of one
-        for last in range(window - 1, len(samples), EVERY):
-            one = samples[np.newaxis, last - window + 1 : last + 1]
-            estimates[0, last] = session.run(None, {name: one})[0]
-    except Exception as error:  # ONNX Runtime's exceptions share no public base class
-        raise NetworkError(f"{network}: ONNX Runtime cannot run it: {error}") from error
+    for last in range(window - 1, len(samples), EVERY):  # many exporters write a batch of one
+        one = samples[np.newaxis, last - window + 1 : last + 1]
+        estimates[0, last] = session.run(None, {name: one})[0]
     return estimates
