@@ -30,6 +30,7 @@ def read_metadata(text: str | None, source: str) -> ModelInfo:
     if text is None:
         raise SensorError(
             f"{source}: its metadata has no entry {METADATA_KEY!r}; its channels are unknown."
+            " docs/sensor-c.md shows how to add it."
         )
     try:
         metadata = json.loads(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import subprocess
 import sys
 import zipfile
@@ -15,7 +16,7 @@ import onnx
 import pytest
 import shipped_fmus as fmus
 from click.testing import CliRunner, Result
-from fmu_face import toolchain
+from fmu_face import ROOT, toolchain
 
 from cosim.check.checker import check
 from cosim.cli import main
@@ -334,7 +335,20 @@ def test_channels_that_are_unknown(model: Path, tmp_path: Path) -> None:
     onnx.save(changed, tmp_path / "bare.onnx")
     result = typed_in(tmp_path / "bare.onnx", "-o", tmp_path / "s.fmu")
     assert result.exit_code == 2
-    assert "its channels are unknown" in result.stderr
+    assert "its channels are unknown. docs/sensor-c.md shows how to add it." in result.stderr
+
+
+def test_the_documentation_tells_how_to_add_them(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    bare = onnx.load(model)
+    del bare.metadata_props[:]
+    onnx.save(bare, "my_network.onnx")
+    page = (ROOT / "docs" / "sensor-c.md").read_text(encoding="utf-8")
+    (program,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(program, {})
+    assert typed_in("my_network.onnx", "-o", "s.fmu").exit_code == 0
 
 
 def test_a_template_that_was_never_built(
