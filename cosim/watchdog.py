@@ -38,7 +38,8 @@ _FAILED: Final = 3
 
 
 class Watchdog:
-    """Ends this process when a run has no new sample for `timeout` [s], or none after Ctrl-C.
+    """Ends this process when a run has no new sample for `timeout` [s], beside the time that it may
+    wait for a sensor on a bus, or none after Ctrl-C.
 
     A context manager around the runs, in the main thread; `output_dir` is where their results go.
     """
@@ -72,7 +73,9 @@ class Watchdog:
         folder = folder_of(scenario, self._output_dir, controller.label)
         name = f"the run {controller.label}" if len(scenario.controllers) > 1 else "the run"
         inner = assemble(scenario, controller)
-        return WatchedAssembly(inner, name, folder, scenario.output.format, self._over)
+        bus = controller.sensor_of_run(scenario.sensor).bus
+        connect_s = 0.0 if bus is None else bus.connect_s
+        return WatchedAssembly(inner, name, folder, scenario.output.format, self._over, connect_s)
 
     def _over(self, run: WatchedAssembly | None) -> None:
         self._under_way = run
@@ -98,7 +101,7 @@ class Watchdog:
                 last, looks = now, 0
             elif interrupted and looks * _LOOK >= _GRACE:
                 self._end(run, "interrupted", INTERRUPTED)
-            elif looks * _LOOK >= self._timeout:
+            elif looks * _LOOK >= self._timeout + (run.connect_s if not run.recorder.rows else 0.0):
                 self._end(run, "hang", _FAILED)
         self._ears.close()
 
@@ -120,13 +123,16 @@ class Watchdog:
 
 @dataclass(frozen=True, eq=False)
 class WatchedAssembly:
-    """The blocks of one run that tell when it begins and ends."""
+    """The blocks of one run that tell when it begins and ends; `connect_s` is how long it may wait
+    for its sensor [s] before its first sample.
+    """
 
     inner: Assembly
     name: str
     folder: Path
     file_format: Literal["csv", "parquet"]
     over: Callable[[WatchedAssembly | None], None]
+    connect_s: float = 0.0
 
     @property
     def recorder(self) -> Recorder:

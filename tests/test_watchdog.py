@@ -108,3 +108,15 @@ def test_a_process_that_was_stopped_has_not_hung(tmp_path: Path) -> None:
     process.send_signal(signal.SIGCONT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 0, said
+
+
+def test_to_wait_for_a_sensor_on_a_bus_is_no_hang(tmp_path: Path) -> None:
+    path = write_scenario(
+        tmp_path, sections={"sensor": "{bus: {interface: virtual, connect_s: 3}}"}
+    )
+    process = started(path, "--timeout", "1")
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 3
+    assert said == (
+        "error: no sensor answers on bus virtual within 3 s; start it with cosim sensor-node\n"
+    )
