@@ -15,10 +15,13 @@ from click.testing import CliRunner
 from loop_rig import write_scenario
 
 from cosim.assembly import assemble
+from cosim.batch.job import Job
+from cosim.batch.worker import check
 from cosim.bus.codec import from_sensor, to_sensor
 from cosim.bus.transport import Address, Link
 from cosim.cli import main
 from cosim.errors import BusError, InputError
+from cosim.isolation import Children
 from cosim.run import execute
 from cosim.scenario.load import load
 from cosim.scenario.schema import Scenario
@@ -121,6 +124,29 @@ def test_a_node_on_the_command_line_is_stopped_by_a_signal_and_tells_what_it_did
     assert figures["frames_lost"] == 0
     assert "fir_residual_w19 (ideal) on bus udp_multicast" in words
     assert "1 runs, 101 samples" in words
+
+
+@pytest.fixture(scope="module")
+def children():
+    with Children(("cosim.batch.worker",)) as made:
+        yield made
+
+
+@pytest.mark.parametrize(
+    ("bus", "private"),
+    [
+        ("{start_node: true}", True),
+        ("{start_node: true, options: {port: 47000}}", False),
+        ("{interface: udp_multicast, connect_s: 9}", False),
+        ("{}", False),
+    ],
+)
+def test_runs_that_would_meet_on_a_bus_go_one_after_another(children, tmp_path, bus, private):
+    path = write_scenario(tmp_path, sections={"sensor": f"{{bus: {bus}}}"})
+    assert load(path).sensor.bus.is_private == private
+    checked = children.run(check, Job(path, tmp_path / "out"))
+    assert checked.problems == ()
+    assert checked.alone != private
 
 
 def test_a_node_that_cannot_start_says_why_before_the_first_step(tmp_path):

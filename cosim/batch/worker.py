@@ -38,12 +38,18 @@ def check(job: Job, journal: Journal) -> Checked:
             job,
             labels=tuple(controller.label for controller in scenario.controllers),
             longest_s=check_scenario(scenario),
-            alone=scenario.real_time is not None,
+            alone=scenario.real_time is not None or _shares_a_bus(scenario),
             file_format=scenario.output.format,
         )
 
     journal.call("the check of the scenario")
     return guarded(look, partial(Checked, job))
+
+
+def _shares_a_bus(scenario: Scenario) -> bool:
+    """Whether runs at the same time would meet on the bus of the scenario's sensor."""
+    bus = scenario.sensor.bus
+    return bus is not None and not bus.is_private
 
 
 def prepare(job: Job, journal: Journal) -> Checked:

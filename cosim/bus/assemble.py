@@ -26,7 +26,7 @@ def address_of(bus: Bus) -> Address:
     nobody uses where none is given, so that runs at the same time do not meet.
     """
     options = dict(bus.options)
-    if bus.start_node and bus.interface == "udp_multicast" and "port" not in options:
+    if bus.is_private:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind(("", 0))
             options["port"] = probe.getsockname()[1]

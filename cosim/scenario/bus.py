@@ -60,3 +60,8 @@ class Bus(Model):
     start_node: bool = Field(
         default=False, description="whether the run starts and ends a sensor node of its own"
     )
+
+    @property
+    def is_private(self) -> bool:
+        """Whether each run finds a bus of its own, so that runs at the same time do not meet."""
+        return self.start_node and self.interface == "udp_multicast" and "port" not in self.options
