@@ -10,7 +10,7 @@ import pytest
 from bus_rig import WAITING, Echo, bench, gateway, node, virtual
 
 from cosim.bus.sensor import BusSensor, Waiting
-from cosim.bus.transport import Address, Link
+from cosim.bus.transport import Address, Link, option_problem
 from cosim.errors import BusError, InputError
 from cosim.metrics import BUS_FIGURES
 
@@ -219,3 +219,24 @@ def test_an_interface_that_cannot_be_opened_is_one_sentence():
         Link(Address("socketcan", "no_such_can0"))
     with pytest.raises(BusError, match=r"cannot open bus udp_multicast 10\.0\.0\.1: \w+"):
         Link(Address("udp_multicast", "10.0.0.1"))
+
+
+@pytest.mark.parametrize(
+    ("interface", "option", "nearest"),
+    [
+        ("udp_multicast", "prot", "port"),
+        ("virtual", "rx_queue", "rx_queue_size"),
+        ("socketcan", "local_loop", "local_loopback"),
+    ],
+)
+def test_an_option_that_python_can_would_leave_out_without_a_word(interface, option, nearest):
+    sentence = f"'{option}' is not an option of {interface}; did you mean '{nearest}'"
+    with pytest.raises(InputError, match=sentence):
+        Link(Address(interface, None, {option: 1}))
+    assert option_problem(interface, {nearest: 1, "bitrate": 500_000}) is None
+
+
+@pytest.mark.parametrize("port", [0, 65536, "47000", 1.5])
+def test_a_port_that_is_none(port):
+    with pytest.raises(InputError, match="port must be a whole number from 1 to 65535, not"):
+        Link(Address("udp_multicast", None, {"port": port}))

@@ -210,6 +210,7 @@ def test_what_a_scenario_may_say_wrong_of_its_bus(tmp_path, monkeypatch):
     option = "sensor.bus.options.port must be text, a number, true or false, not a list"
     assert messages("{options: {port: [1]}}").count("must be") == 1
     assert option in messages("{options: {port: [1]}}")
+    assert "did you mean 'port'" in messages("{options: {prot: 47000}}")
     assert "sensor.bus must be a mapping of fields, not 'can0'" in messages("can0")
     assert "take udp_multicast" in messages("{interface: virtual, start_node: true}")
     monkeypatch.setitem(sys.modules, "cantools", None)

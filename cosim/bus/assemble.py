@@ -6,7 +6,7 @@ import socket
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from cosim.bus.transport import Address, interface_problem, missing_packages
+from cosim.bus.transport import Address, interface_problem, missing_packages, option_problem
 from cosim.errors import Problem
 
 if TYPE_CHECKING:
@@ -72,6 +72,8 @@ def bus_problems(scenario: Scenario) -> list[Problem]:
         return [scenario.problem(("sensor", "bus"), missing)]
     if (wrong := interface_problem(bus.interface)) is not None:
         return [scenario.problem(("sensor", "bus", "interface"), wrong)]
+    if (wrong := option_problem(bus.interface, bus.options)) is not None:
+        return [scenario.problem(("sensor", "bus", "options"), wrong)]
     if bus.start_node and bus.interface == "virtual":
         sentence = (
             "the virtual interface stays within one process, where no sensor node can be started; "

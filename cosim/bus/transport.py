@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
+import inspect
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 Option: TypeAlias = str | int | float | bool
 
 UDP_CHANNEL: Final = "239.74.163.2"  # python-can's own IPv4 group; its default needs IPv6
+LAST_PORT: Final = 65535
 SEND_TIMEOUT_S: Final = 1.0
 WHEN_OPENED: Final = (ImportError, ValueError, TypeError, AttributeError, NotImplementedError)
 """What drivers also raise for a missing library or an option that they do not have."""
@@ -60,6 +63,31 @@ def interface_problem(interface: str) -> str | None:
     return f"'{interface}' is not an interface of python-can{hint}"
 
 
+def option_problem(interface: str, options: Mapping[str, Option]) -> str | None:
+    """Return what is wrong with an option's name or with a port, or None; only for interfaces of
+    python-can that would take any name without a word.
+    """
+    if interface not in ("socketcan", "udp_multicast", "virtual"):
+        return None
+    from can import BusABC
+    from can.interfaces import BACKENDS
+
+    module, kind = BACKENDS[interface]
+    made = getattr(importlib.import_module(module), kind)
+    both = (inspect.signature(one.__init__).parameters.values() for one in (made, BusABC))
+    names = [p.name for its in both for p in its if p.kind != p.VAR_KEYWORD]
+    # A bus that is no wire, or is set up by the system, is told its bit rate all the same.
+    known = sorted({*names, "bitrate"} - {"self", "channel"})
+    for name in options:
+        if name not in known:
+            hint = did_you_mean(name, known) or f", which has {', '.join(known)}"
+            return f"'{name}' is not an option of {interface}{hint}"
+    port = options.get("port", 1)
+    if not isinstance(port, int) or not 0 < port <= LAST_PORT:
+        return f"port must be a whole number from 1 to {LAST_PORT}, not {port!r}"
+    return None
+
+
 class Link:
     """One end of a bus; classic data frames with 11-bit identifiers only.
 
@@ -68,7 +96,11 @@ class Link:
     """
 
     def __init__(self, address: Address) -> None:
-        problem = missing_packages(address.interface) or interface_problem(address.interface)
+        problem = (
+            missing_packages(address.interface)
+            or interface_problem(address.interface)
+            or option_problem(address.interface, address.options)
+        )
         if problem:
             raise InputError(problem)
         import can
