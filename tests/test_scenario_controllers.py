@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,9 +14,11 @@ from loop_rig import write_scenario
 
 from cosim.errors import InputError
 from cosim.run import execute
+from cosim.scenario.controllers import Controller, Law
 from cosim.scenario.load import load
 from sensor.estimators import MODELS, make
 
+FIELD = re.compile(r"`(\w+)`(?: \(([\d.]+)\))?")
 BUMPS = "{kind: bumps, height_m: 0.02, length_m: 0.5, spacing_m: 5}"
 
 
@@ -97,3 +101,19 @@ def test_the_resolved_scenario_runs_again(tmp_path: Path) -> None:
     execute(load(path), tmp_path / "out")
     again = load(tmp_path / "out" / "scenario.resolved.yaml")
     assert again.controllers == load(path).controllers
+
+
+def test_the_page_has_every_kind_with_its_fields_and_defaults() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "scenarios.md").read_text()
+    section = page.partition("\n## Controllers\n")[2].partition("\n## ")[0]
+    rows = [line.split(" | ") for line in section.splitlines() if line.startswith("| `")]
+    told = {row[0].strip("| `"): dict(FIELD.findall(row[2])) for row in rows}
+    kinds = {
+        get_args(model.model_fields["kind"].annotation)[0]: model.model_fields
+        for model in get_args(get_args(Controller)[0])
+    }
+    assert told.keys() == kinds.keys()
+    for kind, fields in kinds.items():
+        assert told[kind].keys() == fields.keys() - Law.model_fields.keys() - {"kind"}
+        for name, default in told[kind].items():
+            assert not default or float(default) == fields[name].default
