@@ -10,14 +10,18 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from cosim.exit_codes import cores, failures_as_exit_codes, one_thread
 from cosim.sensor_cli import sensor
 from cosim.sensor_node_cli import sensor_node
+
+if TYPE_CHECKING:
+    from cosim.isolation import Death
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -320,21 +324,33 @@ def _run_one(
     as_json: bool,
     timeout: float,
 ) -> int:
-    from cosim import show
-    from cosim.scenario.load import load_labelled
+    from cosim.guardian import guarded
 
-    settings = load_labelled(scenario, overrides)
+    def run(ending: Callable[[], None]) -> int:
+        from cosim import show
+        from cosim.scenario.load import load_labelled
 
-    from cosim.run import execute
-    from cosim.watchdog import Watchdog
+        settings = load_labelled(scenario, overrides)
 
-    command = "cosim " + shlex.join(sys.argv[1:])
-    with Watchdog(timeout, target) as watchdog, show.progress() as progress:
-        outcome = execute(settings, target, progress, watchdog.assemble, command)
-    show.outcome(outcome)
-    if as_json:
-        _print_json(outcome.metrics)
-    return outcome.exit_code
+        from cosim.run import execute
+        from cosim.watchdog import Watchdog
+
+        command = "cosim " + shlex.join(sys.argv[1:])
+        with Watchdog(timeout, target, ending) as watchdog, show.progress() as progress:
+            outcome = execute(settings, target, progress, watchdog.assemble, command)
+        show.outcome(outcome)
+        if as_json:
+            _print_json(outcome.metrics)
+        return outcome.exit_code
+
+    def bury(death: Death) -> None:
+        from cosim.batch.buried import bury_run_under_way
+        from cosim.scenario.load import load_labelled
+
+        words = bury_run_under_way(load_labelled(scenario, overrides), target, death)
+        click.echo(f"error: {words}", err=True)
+
+    return guarded(run, bury)
 
 
 def _run_several(

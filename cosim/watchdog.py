@@ -2,7 +2,8 @@
 
 A call into an FMU that does not return can be neither waited for nor interrupted: Python hears of
 Ctrl-C only after it. A thread beside it can still write what was recorded and end the process.
-(Runs of a batch have processes of their own, and are watched from outside: `cosim.batch`.)
+(Crashes are `cosim.guardian`'s. Runs of a batch have processes of their own, and are watched from
+outside: `cosim.batch`.)
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
 
+from cosim import black_box
 from cosim.exit_codes import INTERRUPTED
 from cosim.isolation import Death
 
@@ -41,11 +43,16 @@ class Watchdog:
     """Ends this process when a run has no new sample for `timeout` [s], beside the time that it may
     wait for a sensor on a bus, or none after Ctrl-C.
 
-    A context manager around the runs, in the main thread; `output_dir` is where their results go.
+    A context manager around the runs, in the main thread; `output_dir` is where their results go,
+    `ending` is called before the process is ended. The rows of the run under way lie in a file
+    there, for whoever outlives this process.
     """
 
-    def __init__(self, timeout: float, output_dir: Path) -> None:
-        self._timeout, self._output_dir = timeout, output_dir
+    def __init__(
+        self, timeout: float, output_dir: Path, ending: Callable[[], None] = lambda: None
+    ) -> None:
+        self._timeout, self._output_dir, self._ending = timeout, output_dir, ending
+        self._box: Path | None = None
         self._ears, self._mouth = socket.socketpair()
         self._under_way: WatchedAssembly | None = None
         self._hears = threading.current_thread() is threading.main_thread()
@@ -64,18 +71,27 @@ class Watchdog:
         if self._hears:
             signal.set_wakeup_fd(self._before)
         self._mouth.close()  # which ends the thread
+        self._unbox()
 
     def assemble(self, scenario: Scenario, controller: Controller) -> WatchedAssembly:
         """Connect the blocks of a run, as `cosim.assembly.assemble` does, and watch over it."""
         from cosim.assembly import assemble
         from cosim.results import folder_of
 
+        self._unbox()  # the run before has its signals
         folder = folder_of(scenario, self._output_dir, controller.label)
         name = f"the run {controller.label}" if len(scenario.controllers) > 1 else "the run"
         inner = assemble(scenario, controller)
+        if os.name == "posix":  # where a file that is mapped can be taken away
+            self._box = folder / black_box.NAME
+            inner.recorder.keep_in(self._box)
         bus = controller.sensor_of_run(scenario.sensor).bus
         connect_s = 0.0 if bus is None else bus.connect_s
         return WatchedAssembly(inner, name, folder, scenario.output.format, self._over, connect_s)
+
+    def _unbox(self) -> None:
+        if self._box is not None:
+            self._box.unlink(missing_ok=True)
 
     def _over(self, run: WatchedAssembly | None) -> None:
         self._under_way = run
@@ -115,6 +131,8 @@ class Watchdog:
             show_cursor = "\x1b[?25h\n" if sys.stderr.isatty() else ""
             click.echo(f"{show_cursor}error: {words}", err=True)
             run.let_go()
+            self._unbox()
+            self._ending()
             sys.stdout.flush()
             sys.stderr.flush()
         finally:

@@ -5,7 +5,7 @@ a journal that outlives it. Nothing heavy is imported here.
 """
 
 from cosim.isolation.children import Children, Watch, WorkError
-from cosim.isolation.death import Death
+from cosim.isolation.death import Death, death_of
 from cosim.isolation.journal import Journal
 
-__all__ = ["Children", "Death", "Journal", "Watch", "WorkError"]
+__all__ = ["Children", "Death", "Journal", "Watch", "WorkError", "death_of"]
