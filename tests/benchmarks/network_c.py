@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float64]
 KERNELS: Final = ("avx512", "avx2", "sse2", "neon", "portable")
 COMMAND: Final = 0.3
 STEP_S: Final = 0.01
-FEW, MANY = 60, 80  # steps, both with the window full
+FEW, MANY = 52, 54  # steps, both with the window full
 _TOTAL = re.compile(r"^ *([\d,]+)[ (].*PROGRAM TOTALS", re.MULTILINE)
 
 
