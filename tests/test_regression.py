@@ -303,3 +303,11 @@ def test_an_interrupt_leaves_what_was_recorded(tmp_path: Path) -> None:
     assert "interrupted; what was recorded until then is on disk" in said
     assert len((box.parent / "signals.csv").read_text().splitlines()) == 1 + 8
     assert not box.exists()
+
+
+def test_to_wait_for_a_sensor_on_a_bus_is_no_hang(tmp_path: Path) -> None:
+    sections = {"sensor": "{bus: {interface: virtual, connect_s: 3}}"}
+    path = write_scenario(tmp_path, sections=sections)
+    result = cosim(str(path), "--timeout", "1", "--output-dir", str(tmp_path / "out"))
+    assert result.exit_code == 1
+    assert "no sensor answers on bus virtual within 3 s" in result.stderr

@@ -36,7 +36,8 @@ class Checked:
     """What is known of a job before its first step: what is wrong with it, else its runs.
 
     `longest_s` is the simulated time that one run may take [s]; `alone` whether nothing else should
-    go on beside it; `file_format` is that of the signals.
+    go on beside it; `connect_s` how long a run may wait for a sensor on a bus [s]; `file_format` is
+    that of the signals.
     """
 
     job: Job
@@ -45,6 +46,7 @@ class Checked:
     labels: tuple[str, ...] = ()
     longest_s: float = 0.0
     alone: bool = False
+    connect_s: float = 0.0
     file_format: Literal["csv", "parquet"] = "csv"
 
 

@@ -23,17 +23,20 @@ MODULES: Final = (
 @dataclass(frozen=True)
 class Task(Generic[J, E]):
     """What a process does with a job, what is said of a job whose process died, how long a job may
-    stand still [s], and what changes as long as it goes on, beside the calls in its journal.
+    stand still [s], what changes as long as it goes on, beside the calls in its journal, and how
+    much longer one may wait for others [s].
     """
 
     work: Callable[[J, Journal], E]
     died: Callable[[J, Death], E]
     timeout: float | None = None
     pulse: Callable[[J], Any] = lambda job: None
+    patience: Callable[[J], float] = lambda job: 0.0
 
     def done(self, children: Children, job: J) -> E:
         """Return what comes of a job."""
-        answer = children.run(self.work, job, Watch(self.timeout, partial(self.pulse, job)))
+        timeout = None if self.timeout is None else self.timeout + self.patience(job)
+        answer = children.run(self.work, job, Watch(timeout, partial(self.pulse, job)))
         return self.died(job, answer) if isinstance(answer, Death) else answer
 
 

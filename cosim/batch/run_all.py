@@ -71,7 +71,7 @@ class _Batch:
         self._scenarios = scenarios
         self._ends: dict[Job, dict[str, RunEnd]] = {one.job: {} for one in scenarios}
         self._lock = threading.Lock()
-        self._drive = Task(worker.drive, buried, timeout, _rows)
+        self._drive = Task(worker.drive, buried, timeout, _rows, _patience)
         self._conclude = Task(worker.conclude, _unconcluded)
 
     def run(self, pool: Pool, tell: Tell) -> dict[Job, Ended]:
@@ -111,6 +111,10 @@ def _ended(checked: Checked) -> Ended:
 
 def _rows(run: Run) -> int:
     return black_box.filled(run.folder / black_box.NAME)
+
+
+def _patience(run: Run) -> float:
+    return run.checked.connect_s
 
 
 def _unfit(job: Job, death: Death) -> Checked:

@@ -34,11 +34,13 @@ def check(job: Job, journal: Journal) -> Checked:
         from cosim.assembly import check as check_scenario
 
         scenario = _loaded(job)
+        bus = scenario.sensor.bus
         return Checked(
             job,
             labels=tuple(controller.label for controller in scenario.controllers),
             longest_s=check_scenario(scenario),
             alone=scenario.real_time is not None or _shares_a_bus(scenario),
+            connect_s=bus.connect_s if bus is not None else 0.0,
             file_format=scenario.output.format,
         )
 
