@@ -80,7 +80,7 @@ def test_other_files_get_a_sentence(tmp_path: Path, name: str, content: bytes, w
 
 def test_other_archives_get_a_sentence(tmp_path: Path) -> None:
     for member, words in (
-        ("SystemStructure.ssd", "a system of FMUs (SSP)"),
+        ("SystemStructure.ssd", "an OpenCRG road; unzip it and inspect the FMUs in resources/"),
         ("[Content_Types].xml", "an Office document"),
         ("a.txt", "a ZIP archive without modelDescription.xml"),
     ):

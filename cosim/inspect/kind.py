@@ -90,7 +90,7 @@ def _yaml(path: Path, text: str) -> Kind:
     if "road" in keys or "controllers" in keys or "driver" in keys:
         return "scenario"
     if "runs" in keys and "training" in keys:
-        raise _other(path, "a training recipe (python -m sensor.train)")
+        raise _other(path, "a training recipe (cosim sensor train)")
     if "runs" in keys:
         raise _other(path, "a recipe of a data set (cosim sensor dataset)")
     if keys & {"loads", "parameters", "scales"} and "name" in keys:
@@ -115,7 +115,9 @@ def _written(path: Path, text: str) -> str:
 def _other(path: Path, looks: str) -> InputError:
     same = [n for n in _candidates(path.parent) if Path(n).stem == path.stem and n != path.name]
     hint = _question(path.parent / same[0]) if same else ""
-    return InputError(f"{path} looks like {looks}, not {WANTED}{hint}")
+    what, _, advice = looks.partition("; ")
+    then = f"; {advice}" if advice else ""
+    return InputError(f"{path} looks like {what}, not {WANTED}{then}{hint}")
 
 
 def _candidates(folder: Path) -> list[str]:
