@@ -176,7 +176,7 @@ def over_the_gain() -> str:
 
 def _sweep() -> Iterator[Sequence[str]]:
     for name, settings in _swept():
-        scenario = load(SWEPT, ["limits=[]", f"controllers=[{{{settings}}}]"])
+        scenario = load(SWEPT, ["limits=[]", "goldens=[]", f"controllers=[{{{settings}}}]"])
         comfort = assemble(scenario, scenario.controllers[0], NoSensor()).run(None).comfort
         yield (
             name,
