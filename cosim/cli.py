@@ -30,6 +30,16 @@ def main() -> None:
     """Drive a vehicle FMU over a road and compare a virtual suspension sensor with the truth."""
 
 
+timeout_option = click.option(
+    "--timeout",
+    metavar="S",
+    default=60.0,
+    show_default=True,
+    type=click.FloatRange(min=0, min_open=True),
+    help="Wall time in s without a new sample after which a run counts as hanging.",
+)
+
+
 class RealTimeCommand(click.Command):
     """A command whose `--real-time` takes a factor after an equals sign only: what follows it is
     the next argument.
@@ -70,14 +80,7 @@ class RealTimeCommand(click.Command):
     type=click.IntRange(1),
     help="Run up to N scenarios at the same time, as many as there are cores by default.",
 )
-@click.option(
-    "--timeout",
-    metavar="S",
-    default=60.0,
-    show_default=True,
-    type=click.FloatRange(min=0, min_open=True),
-    help="Wall time in s without a new sample after which a run counts as hanging.",
-)
+@timeout_option
 @click.option(
     "--real-time",
     metavar="[=FACTOR]",
@@ -141,14 +144,7 @@ def run(
     type=click.IntRange(1),
     help="Run up to N at the same time, as many as there are cores by default.",
 )
-@click.option(
-    "--timeout",
-    metavar="S",
-    default=60.0,
-    show_default=True,
-    type=click.FloatRange(min=0, min_open=True),
-    help="Wall time in s without a new sample after which a run counts as hanging.",
-)
+@timeout_option
 @click.option("--json", "as_json", is_flag=True, help="Print a list of the metrics as JSON.")
 def test_scenarios(
     paths: tuple[Path, ...],

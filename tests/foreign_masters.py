@@ -11,6 +11,7 @@ import platform
 import shutil
 import sys
 import zipfile
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -109,6 +110,32 @@ def run_ssp(master: str, ssp: Ssp) -> Rows:
         return pool.submit(runner, ssp).result()
 
 
+def references(fmu: Path) -> dict[str, int]:
+    """Value references by name."""
+    return {v.name: v.valueReference for v in fmpy.read_model_description(str(fmu)).modelVariables}
+
+
+def start_values(
+    execution: Any, slave: int, reference: Mapping[str, int], parameters: Mapping[str, Any]
+) -> None:
+    """Give one FMU in libcosim its start values."""
+    for name, value in parameters.items():
+        text = isinstance(value, str)
+        setter = execution.string_initial_value if text else execution.real_initial_value
+        assert setter(slave, reference[name], value)
+
+
+def ecos_parameters(parameters: Mapping[str, Any]) -> Any:
+    """Start values of the FMU `car` as Ecos takes them."""
+    from ecospy.EcosParameterSet import EcosParameterSet
+
+    found = EcosParameterSet()
+    for name, value in parameters.items():
+        add = found.add_string if isinstance(value, str) else found.add_real
+        add(f"car::{name}", value)
+    return found
+
+
 def libcosim(task: Task) -> Rows:
     """The Open Simulation Platform's co-simulation engine; FMI 2 only."""
     from libcosimpy.CosimExecution import CosimExecution
@@ -118,18 +145,14 @@ def libcosim(task: Task) -> Rows:
     from libcosimpy.CosimSlave import CosimLocalSlave
 
     log_output_level(CosimLogLevel.ERROR)
-    variables = fmpy.read_model_description(str(task.fmu)).modelVariables
-    reference = {v.name: v.valueReference for v in variables}
+    reference = references(task.fmu)
     inputs, outputs = ([reference[n] for n in names] for names in (task.inputs, task.outputs))
     execution = CosimExecution.from_step_size(task.step_size * 1e9)
     car = execution.add_local_slave(CosimLocalSlave(str(task.fmu), "car"))
     manipulator, observer = CosimManipulator.create_override(), CosimObserver.create_last_value()
     execution.add_manipulator(manipulator)
     execution.add_observer(observer)
-    for name, value in task.parameters.items():
-        text = isinstance(value, str)
-        setter = execution.string_initial_value if text else execution.real_initial_value
-        assert setter(car, reference[name], value)
+    start_values(execution, car, reference, task.parameters)
     rows = []
     for command in task.commands:
         assert manipulator.slave_real_values(car, inputs, command)
@@ -140,14 +163,10 @@ def libcosim(task: Task) -> Rows:
 
 def ecos(task: Task) -> Rows:
     """Ecos; FMI 2 and 3."""
-    from ecospy.EcosParameterSet import EcosParameterSet
     from ecospy.EcosSimulation import EcosSimulation
     from ecospy.EcosSimulationStructure import EcosSimulationStructure
 
-    parameters = EcosParameterSet()
-    for name, value in task.parameters.items():
-        add = parameters.add_string if isinstance(value, str) else parameters.add_real
-        add(f"car::{name}", value)
+    parameters = ecos_parameters(task.parameters)
     rows = []
     with EcosSimulationStructure() as structure:
         structure.add_model("car", str(task.fmu))
@@ -162,11 +181,6 @@ def ecos(task: Task) -> Rows:
             simulation.terminate()
     parameters.free()
     return rows
-
-
-def references(fmu: Path) -> dict[str, int]:
-    """Value references by name."""
-    return {v.name: v.valueReference for v in fmpy.read_model_description(str(fmu)).modelVariables}
 
 
 def libcosim_pair(pair: Pair) -> Rows:
@@ -187,10 +201,7 @@ def libcosim_pair(pair: Pair) -> Rows:
     manipulator, observer = CosimManipulator.create_override(), CosimObserver.create_last_value()
     execution.add_manipulator(manipulator)
     execution.add_observer(observer)
-    for name, value in pair.parameters.items():
-        text = isinstance(value, str)
-        setter = execution.string_initial_value if text else execution.real_initial_value
-        assert setter(car, of_car[name], value)
+    start_values(execution, car, of_car, pair.parameters)
     rows, n = [], len(pair.car_inputs)
     for command in pair.commands:
         ours = (of_car[name] for name in pair.car_inputs)
@@ -205,14 +216,10 @@ def libcosim_pair(pair: Pair) -> Rows:
 
 def ecos_pair(pair: Pair) -> Rows:
     """Vehicle and sensor in Ecos."""
-    from ecospy.EcosParameterSet import EcosParameterSet
     from ecospy.EcosSimulation import EcosSimulation
     from ecospy.EcosSimulationStructure import EcosSimulationStructure
 
-    parameters = EcosParameterSet()
-    for name, value in pair.parameters.items():
-        add = parameters.add_string if isinstance(value, str) else parameters.add_real
-        add(f"car::{name}", value)
+    parameters = ecos_parameters(pair.parameters)
     set_by_us = [f"car::{name}" for name in pair.car_inputs]
     set_by_us += [f"sensor::{name}" for name in pair.sensor_inputs]
     rows = []

@@ -143,15 +143,19 @@ class Law(OneRun):
         return self
 
 
-class Gained(Law):
-    """A law with a damping of its own."""
-
-    gain_ns_per_m: float = Field(
-        default=SKYHOOK_GAIN,
+def _gain(default: float) -> Any:
+    return Field(
+        default=default,
         gt=0,
         description="skyhook damping of one corner",
         json_schema_extra=with_unit("N s/m"),
     )
+
+
+class Gained(Law):
+    """A law with a damping of its own."""
+
+    gain_ns_per_m: float = _gain(SKYHOOK_GAIN)
 
 
 class Skyhook(Gained):
@@ -164,12 +168,7 @@ class CautiousSkyhook(Gained):
     """Skyhook that weighs how uncertain the estimate is."""
 
     kind: Literal["cautious_skyhook"]
-    gain_ns_per_m: float = Field(
-        default=CAUTIOUS_GAIN,
-        gt=0,
-        description="skyhook damping of one corner",
-        json_schema_extra=with_unit("N s/m"),
-    )
+    gain_ns_per_m: float = _gain(CAUTIOUS_GAIN)
     least_deviation_m_s: float = Field(
         default=LEAST_DEVIATION,
         ge=0,
