@@ -14,9 +14,11 @@ from cosim.isolation import Children, Death, Journal, Watch
 
 J = TypeVar("J")
 E = TypeVar("E")
+# Imported once, before the forks: else each of a scenario's four would import them anew.
 MODULES: Final = (
-    "cosim.assembly", "cosim.batch.conclusion", "cosim.compare", "cosim.report", "cosim.run",
-    "onnxruntime",
+    "cosim.assembly", "cosim.batch.conclusion", "cosim.compare", "cosim.control.against_truth",
+    "cosim.control.figures", "cosim.report", "cosim.run", "cosim.scenario.load", "fmpy", "jinja2",
+    "lxml.etree", "onnxruntime", "sensor.carried.runtime", "sensor.runtime",
 )  # fmt: skip
 
 
